@@ -1,0 +1,1 @@
+"""The command line and the trial: what composes the other packages."""

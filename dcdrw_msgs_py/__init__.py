@@ -1,0 +1,1 @@
+"""The wire contract: quantities, samples, topics, conversions, node helpers."""

@@ -1,0 +1,152 @@
+"""Quantities: every parameter's default, unit, bounds and meaning, declared once.
+
+A parameter set is a ``NamedTuple`` whose fields are ``Annotated[type, Quantity(...)]``; a field that is
+itself such a tuple is a group, and its fields get dotted names (``front.length``). Nodes, command line,
+YAML files and the tables of the docs are all read from these declarations.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
+from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
+
+Params = TypeVar('Params', bound=tuple[Any, ...])
+
+
+class Quantity(NamedTuple):
+    """What a parameter means and which values it may take."""
+
+    doc: str
+    unit: str = ''
+    low: float = -math.inf
+    """Smallest value allowed."""
+    high: float = math.inf
+    """Largest value allowed."""
+    above: float = -math.inf
+    """Exclusive lower bound."""
+    derived: str = ''
+    """Where the default NaN stands for a value derived from others: the rule."""
+    live: bool = False
+    """May change while a node runs."""
+
+    @property
+    def bounds(self) -> str:
+        """The allowed values in words; empty where every finite value is allowed."""
+        parts = []
+        if self.above > -math.inf:
+            parts.append(f'> {self.above:g}')
+        if self.low > -math.inf:
+            parts.append(f'≥ {self.low:g}')
+        if self.high < math.inf:
+            parts.append(f'≤ {self.high:g}')
+        return ', '.join(parts)
+
+    def allows(self, value: float) -> bool:
+        """Whether a number is finite and within the bounds (NaN only where a default is derived)."""
+        if math.isnan(value):
+            return bool(self.derived)
+        return math.isfinite(value) and value > self.above and self.low <= value <= self.high
+
+
+class Field(NamedTuple):
+    """One parameter of a set, by its dotted name."""
+
+    name: str
+    kind: type
+    default: Any
+    quantity: Quantity
+
+    def coerce(self, value: Any) -> Any:
+        """The value as this field's type.
+
+        Raises:
+            ValueError: the value is of another type or out of bounds.
+
+        """
+        if self.kind in (int, float) and isinstance(value, (int, float)) and not isinstance(value, bool):
+            if self.kind is int and value != int(value):
+                raise ValueError(f'{self.name} must be a whole number, got {value!r}')
+            if not self.quantity.allows(value):
+                raise ValueError(f'{self.name} must be {self.requirement}, got {value!r}')
+            return self.kind(value)
+        if self.kind in (bool, str) and isinstance(value, self.kind):
+            return value
+        raise ValueError(f'{self.name} must be {_KIND_NAMES[self.kind]}, got {value!r}')
+
+    @property
+    def requirement(self) -> str:
+        """The bounds with their unit, for messages."""
+        return ' '.join(filter(None, (self.quantity.bounds or 'finite', self.quantity.unit)))
+
+
+_KIND_NAMES: dict[type, str] = {int: 'a whole number', float: 'a number', bool: 'true or false', str: 'a string'}
+
+
+def fields(params: type[tuple[Any, ...]], prefix: str = '') -> Iterator[Field]:
+    """Yield every parameter of a set, groups flattened, in the order of declaration."""
+    defaults = params._field_defaults  # type: ignore[attr-defined]
+    for name, hint in get_type_hints(params, include_extras=True).items():
+        if name not in defaults:
+            continue
+        if get_origin(hint) is Annotated:
+            kind, quantity = get_args(hint)
+            yield Field(prefix + name, kind, defaults[name], quantity)
+        else:
+            for inner in fields(hint, f'{prefix}{name}.'):
+                group_default = inner.name.removeprefix(f'{prefix}{name}.')
+                yield inner._replace(default=lookup(defaults[name], group_default))
+
+
+def lookup(params: tuple[Any, ...], name: str) -> Any:
+    """The value of a dotted name in a parameter set."""
+    value: Any = params
+    for part in name.split('.'):
+        value = getattr(value, part)
+    return value
+
+
+def build(params: type[Params], values: Mapping[str, Any], source: str = '') -> Params:
+    """Make a parameter set from dotted names; what is absent takes its default.
+
+    Raises:
+        ValueError: an unknown name, a wrong type or a value out of bounds; `source` (a file's name, say)
+            is added to the message.
+
+    """
+    where = f' ({source})' if source else ''
+    known = {field.name: field for field in fields(params)}
+    for name in values:
+        if name not in known:
+            near = get_close_matches(name, known, n=1)
+            hint = f'; did you mean {near[0]}?' if near else f'; known are {", ".join(known)}'
+            raise ValueError(f'{name} is not a parameter{where}{hint}')
+    try:
+        flat = {name: field.coerce(values.get(name, field.default)) for name, field in known.items()}
+    except ValueError as error:
+        raise ValueError(f'{error}{where}') from None
+    return _nest(params, flat, '')
+
+
+def _nest(params: type[Params], flat: Mapping[str, Any], prefix: str) -> Params:
+    values = {}
+    for name, hint in get_type_hints(params, include_extras=True).items():
+        if get_origin(hint) is Annotated:
+            values[name] = flat[prefix + name]
+        elif name in params._fields:  # type: ignore[attr-defined]
+            values[name] = _nest(hint, flat, f'{prefix}{name}.')
+    return params(**values)
+
+
+def flatten(params: tuple[Any, ...]) -> dict[str, Any]:
+    """Every parameter's value by its dotted name: the inverse of `build`."""
+    return {field.name: lookup(params, field.name) for field in fields(type(params))}
+
+
+def check(params: Params, source: str = '') -> Params:
+    """Return the same set with each value checked and made its declared type.
+
+    Raises:
+        ValueError: as `build`.
+
+    """
+    return build(type(params), flatten(params), source)

@@ -1,0 +1,53 @@
+"""The rig: two rimless wheels, the coupler between their hubs, and the slope (contract §1)."""
+
+import math
+from typing import Annotated, NamedTuple
+
+from dcdrw_msgs_py.quantity import Quantity
+
+FRONT = 'front'
+REAR = 'rear'
+
+
+class WheelParams(NamedTuple):
+    """One rimless wheel; the paper's wheel by default."""
+
+    length: Annotated[float, Quantity('hub to foot, ℓ', 'm', above=0.0)] = 0.9652
+    mass: Annotated[float, Quantity('point mass at the hub, m', 'kg', above=0.0)] = 10.0
+    spokes: Annotated[float, Quantity('number of spokes, π/α; need not be whole', low=4.0)] = 12.0
+
+    @property
+    def alpha(self) -> float:
+        """Half the angle between two spokes, α [rad]."""
+        return math.pi / self.spokes
+
+    @property
+    def step_length(self) -> float:
+        """Distance between two footholds, σ = 2 ℓ sin α [m] (paper's (14), with ℓ_i)."""
+        return 2.0 * self.length * math.sin(self.alpha)
+
+
+StanceDistance = Annotated[
+    float, Quantity('distance of the stance feet at the start, x1 − x2', 'm', derived='ℓ of the front wheel')]
+
+
+class RigParams(NamedTuple):
+    """The whole rig; the paper's experiment by default."""
+
+    front: WheelParams = WheelParams()
+    rear: WheelParams = WheelParams()
+    k: Annotated[float, Quantity('stiffness of the coupler', 'N/m', low=0.0, live=True)] = 5.25
+    b: Annotated[float, Quantity('damping of the coupler', 'N·s/m', low=0.0, live=True)] = 100.0
+    D0: Annotated[float, Quantity('length of the coupler at rest', 'm', low=0.0, live=True,
+                                  derived='S0 + ℓ sin α: at rest at φ = α')] = math.nan
+    S0: StanceDistance = math.nan
+    slope: Annotated[float, Quantity('slope γ, positive downhill', 'rad', low=-math.pi / 4, high=math.pi / 4,
+                                     live=True)] = math.radians(2.0)
+    gravity: Annotated[float, Quantity('gravitational acceleration g', 'm/s²', above=0.0)] = 9.81
+
+    def resolved(self) -> 'RigParams':
+        """The same rig with its derived defaults filled in."""
+        front = self.front
+        S0 = front.length if math.isnan(self.S0) else self.S0
+        D0 = S0 + front.length * math.sin(front.alpha) if math.isnan(self.D0) else self.D0
+        return self._replace(S0=S0, D0=max(D0, 0.0))

@@ -1,0 +1,75 @@
+"""Samples: what passes between the cores, as plain data. Time arrives in the sample; no core has a clock."""
+
+import math
+from typing import NamedTuple
+
+NAN = math.nan
+
+
+class Turn(NamedTuple):
+    """An angle and its rate, both NaN where unknown."""
+
+    angle: float = NAN
+    """[rad]"""
+    rate: float = NAN
+    """[rad/s]"""
+
+
+class CouplerSample(NamedTuple):
+    """The coupler, where the source knows it."""
+
+    length: float = NAN
+    """D [m]."""
+    rate: float = NAN
+    """Ḋ [m/s]."""
+    force: float = NAN
+    """F [N], positive in tension."""
+
+
+class JointSample(NamedTuple):
+    """One `joint_states` message: the rotations ψ of both wheels at one instant."""
+
+    stamp_ns: int
+    front: Turn
+    rear: Turn
+    coupler: CouplerSample = CouplerSample()
+
+
+class PhaseSample(NamedTuple):
+    """One `phase_state` message: stance angles, phase difference and step difference at one instant."""
+
+    stamp_ns: int
+    front: Turn
+    """θ1 in [−α1, α1)."""
+    rear: Turn
+    """θ2 in [−α2, α2)."""
+    phi: Turn
+    """φ in [0, α1 + α2)."""
+    step_difference: int
+    """n = n1 − n2."""
+    restarts: int = 0
+    """How often the source has started anew; the count n starts afresh with it."""
+
+
+class Footfall(NamedTuple):
+    """One strike of a wheel."""
+
+    wheel: str
+    """`front` or `rear`."""
+    stamp_ns: int
+    """The strike's own time, interpolated between samples."""
+    x: float
+    """The new stance foot's place down the slope [m]."""
+    steps: int
+    """n_i after the strike."""
+
+
+class SyncSample(NamedTuple):
+    """The synchronization error at one instant."""
+
+    stamp_ns: int
+    error: float
+    """e, wrapped to [−α, α) [rad]."""
+    error_percent: float
+    """100 (p − 0.5) [% of a step]."""
+    synchronized: bool

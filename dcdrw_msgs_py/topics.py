@@ -1,0 +1,40 @@
+"""The topics: name, message type and quality of service, declared once (contract §5)."""
+
+from typing import NamedTuple
+
+
+class Topic(NamedTuple):
+    """A topic of the suite. Names are relative, so that namespaces and remapping work."""
+
+    name: str
+    type: str
+    """Package and message, as `ros2 interface show` takes it."""
+    doc: str
+    depth: int = 10
+    """Messages that a publisher keeps for a subscriber that lags."""
+    latched: bool = False
+    """A late subscriber gets the last message."""
+
+
+# 1000 messages are a second at 1 kHz: a reader that stalls for 50 ms loses nothing.
+SAMPLE_DEPTH = 1000
+
+JOINT_STATES = Topic('joint_states', 'sensor_msgs/msg/JointState',
+                     'rotation and speed of both wheels; the coupler where known', SAMPLE_DEPTH)
+COUPLER_FORCE_COMMAND = Topic('coupler_force_command', 'std_msgs/msg/Float64',
+                              'force added to the coupler, N; zero when stale')
+PHASE_STATE = Topic('phase_state', 'sensor_msgs/msg/JointState',
+                    'stance angles, φ and step difference', SAMPLE_DEPTH)
+PHI = Topic('phi', 'std_msgs/msg/Float64', 'φ, rad', SAMPLE_DEPTH)
+STEP_DIFFERENCE = Topic('step_difference', 'std_msgs/msg/Int32', 'n = n1 − n2', SAMPLE_DEPTH)
+FOOTFALLS = Topic('footfalls', 'geometry_msgs/msg/PointStamped',
+                  'one per strike: wheel, time, place x, step number z', SAMPLE_DEPTH)
+SYNC_ERROR = Topic('sync_error', 'std_msgs/msg/Float64', 'e, rad', SAMPLE_DEPTH)
+SYNC_ERROR_PERCENT = Topic('sync_error_percent', 'std_msgs/msg/Float64', 'e, percent of a step', SAMPLE_DEPTH)
+SYNCHRONIZED = Topic('synchronized', 'std_msgs/msg/Bool', 'whether the pair walks in step', 1, latched=True)
+DIAGNOSTICS = Topic('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', 'health, 1 Hz')
+CLOCK = Topic('/clock', 'rosgraph_msgs/msg/Clock', 'simulated time, when asked')
+
+# Names of the joints in joint_states and phase_state.
+FRONT_WHEEL, REAR_WHEEL, COUPLER = 'front_wheel', 'rear_wheel', 'coupler'
+FRONT_STANCE, REAR_STANCE, PHI_JOINT, STEP_DIFFERENCE_JOINT = 'front_stance', 'rear_stance', 'phi', 'step_difference'

@@ -1,0 +1,1 @@
+"""The model: dynamics, strikes, integration, and the simulator node."""

@@ -1,0 +1,85 @@
+"""Cases and their strikes as JSON: what `dcdrw simulate` reads and writes."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from dcdrw_msgs_py.quantity import check
+from dcdrw_msgs_py.rig import RigParams, WheelParams
+from dcdrw_sim.dynamics import State
+from dcdrw_sim.strikes import Strike
+from dcdrw_sim.trajectory import Run
+
+DEFAULT_STRIKES = 20
+"""Strikes of a case that lists none."""
+
+_NUMBERS = ('g', 'slope', 'k', 'b', 'D0', 'S0')
+_PAIRS = ('l', 'm', 'alpha')
+
+
+class Case(NamedTuple):
+    """A rig and its start, as a case file holds them."""
+
+    name: str
+    rig: RigParams
+    state: State
+    listed_strikes: int
+    """How many strikes the file lists; DEFAULT_STRIKES where it lists none."""
+    raw: dict[str, Any]
+    """The `case` object as it was read."""
+
+
+def read_cases(path: Path) -> tuple[list[Case], bool]:
+    """Read one case or a list of cases; the second value tells whether it was a list.
+
+    A case is an object with g, slope, k, b, D0, S0, the pairs l, m, alpha, and x0 = [θ1, ω1, θ2, ω2]; or
+    such an object under the key `case` beside its `strikes`.
+
+    Raises:
+        ValueError: not JSON, or not a case: the message names the file, the case and the key.
+
+    """
+    try:
+        content = json.loads(path.read_text(encoding='utf-8'))
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f'{path} is not JSON: {error}') from None
+    entries = content if isinstance(content, list) else [content]
+    return [_parse(entry, f'{path}, case {index}') for index, entry in enumerate(entries)], isinstance(content, list)
+
+
+def _parse(entry: Any, where: str) -> Case:
+    raw = entry.get('case', entry) if isinstance(entry, dict) else None
+    if not isinstance(raw, dict):
+        raise ValueError(f'{where}: must be an object with the keys {", ".join((*_NUMBERS, *_PAIRS, "x0"))}')
+    where = f'{where} ({raw["name"]})' if 'name' in raw else where
+    values = {key: _numbers(raw, key, 1, where)[0] for key in _NUMBERS}
+    length, mass, alpha = (_numbers(raw, key, 2, where) for key in _PAIRS)
+    for angle in alpha:
+        if not 0.0 < angle <= math.pi / 4:
+            raise ValueError(f'{where}: alpha must be in (0, π/4] rad, got {angle}')
+    wheels = [WheelParams(length[i], mass[i], math.pi / alpha[i]) for i in (0, 1)]
+    rig = RigParams(wheels[0], wheels[1], values['k'], values['b'], values['D0'], values['S0'], values['slope'], values['g'])
+    strikes = entry.get('strikes')
+    count = len(strikes) if isinstance(strikes, list) and strikes else DEFAULT_STRIKES
+    return Case(str(raw.get('name', 'case')), check(rig, where), State(*_numbers(raw, 'x0', 4, where)), count, raw)
+
+
+def _numbers(raw: dict[str, Any], key: str, count: int, where: str) -> list[float]:
+    if key not in raw:
+        raise ValueError(f'{where}: {key} is missing')
+    values = raw[key] if isinstance(raw[key], list) else [raw[key]]
+    if len(values) != count or not all(isinstance(v, (int, float)) and math.isfinite(v) for v in values):
+        raise ValueError(f'{where}: {key} must be {f"{count} finite numbers" if count > 1 else "a finite number"}, got {raw[key]!r}')
+    return [float(value) for value in values]
+
+
+def strike_record(strike: Strike) -> dict[str, Any]:
+    """One strike as the file holds it."""
+    return {'wheel': strike.wheel, 't': strike.t, 'state': [float(value) for value in strike.state]}
+
+
+def run_record(case: Case, run: Run) -> dict[str, Any]:
+    """One case with its strikes and why it ended, in the format of the file that it came from."""
+    end = {'reason': run.end.name.lower(), 'meaning': run.end.meaning, 't': run.duration}
+    return {'case': case.raw, 'strikes': [strike_record(strike) for strike in run.strikes], 'end': end}

@@ -1,0 +1,1 @@
+"""From joint states to phase and synchronization: cores and nodes."""
