@@ -1,0 +1,48 @@
+# `make trial` and `make test` need python3 (3.10 to 3.13) with venv, and PyPI; no ROS. Where a ROS 2 is sourced
+# (ROS_DISTRO is set), its rclpy is used instead of the wheels from PyPI.
+PYTHON ?= python3
+ifdef ROS_DISTRO
+VENV := .venv-$(ROS_DISTRO)
+VENV_FLAGS := --system-site-packages
+EXTRAS := figures,speed,test,lint
+else
+VENV := .venv
+EXTRAS := ros,figures,speed,test,lint
+# The wheels' loader marks its environment; another environment's mark must not reach ours.
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
+endif
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+.PHONY: help trial test lint bench clean
+help:
+	@echo 'make trial   run the paper'"'"'s trial in simulation and draw it (into trials/)'
+	@echo 'make test    run every test'
+	@echo 'make lint    ruff and mypy --strict'
+	@echo 'make bench   print the tables of speed (minutes)'
+	@echo 'make clean   remove what was made here; trials stay'
+
+trial: $(READY)
+	@$(BIN)/dcdrw trial $(ARGS)
+
+test: $(READY)
+	@$(BIN)/python -m pytest $(ARGS)
+
+lint: $(READY)
+	@$(BIN)/ruff check .
+	@$(BIN)/mypy
+
+bench: $(READY)
+	@$(BIN)/python benchmarks/trajectories.py
+	@$(BIN)/python benchmarks/pipeline.py
+
+$(READY): setup.cfg setup.py
+	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; (3, 10) <= v <= (3, 13) or sys.exit(f"python3 is {v[0]}.{v[1]}; rclpy needs 3.10 to 3.13: make PYTHON=python3.12 ...")'
+	@echo 'Setting up $(VENV) (once) ...'
+	@$(PYTHON) -m venv $(VENV_FLAGS) $(VENV)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(EXTRAS)]'
+	@touch $@
+
+clean:
+	rm -rf .venv .venv-* build install log *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,94 @@
+"""The listener of a trial: what the nodes published, kept in memory and, as it comes, in files."""
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from rclpy.node import Node
+
+from dcdrw_msgs_py.messages import JointSampleReader, PhaseSampleReader, footfall
+from dcdrw_msgs_py.node import Age, listen
+from dcdrw_msgs_py.samples import Footfall, JointSample, PhaseSample
+from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, JOINT_STATES, PHASE_STATE, SYNC_ERROR, SYNCHRONIZED
+
+SAMPLES_HEADER = ('stamp_ns', 'theta1', 'omega1', 'theta2', 'omega2', 'phi', 'phi_rate', 'step_difference',
+                  'restarts')
+FOOTFALLS_HEADER = ('wheel', 'stamp_ns', 'x', 'steps')
+
+
+class Observer(Node):
+    """Hears every topic of a trial."""
+
+    def __init__(self, folder: Path, **kwargs: Any) -> None:
+        super().__init__('trial', **kwargs)
+        self._folder = folder
+        self.joints: list[JointSample] = []
+        self.phases: list[PhaseSample] = []
+        self.footfalls: list[Footfall] = []
+        self.errors = 0
+        """Messages of the monitor: the whole chain works when the first has come."""
+        self.synchronized = False
+        self.failure = ''
+        self._recording = False
+        self.diagnoses: dict[str, tuple[int, str]] = {}
+        self.age = Age()
+        self._joints_reader, self._phase_reader = JointSampleReader(), PhaseSampleReader()
+        self._files = [(folder / name).open('w', encoding='utf-8', newline='')
+                       for name in ('samples.csv', 'footfalls.csv')]
+        self._samples, self._falls = (csv.writer(file) for file in self._files)
+        self._samples.writerow(SAMPLES_HEADER)
+        self._falls.writerow(FOOTFALLS_HEADER)
+        for topic, callback in ((JOINT_STATES, self._on_joints), (PHASE_STATE, self._on_phase),
+                                (SYNC_ERROR, self._on_error), (SYNCHRONIZED, self._on_synchronized),
+                                (FOOTFALLS, self._on_footfall), (DIAGNOSTICS, self._on_diagnostics)):
+            listen(self, topic, callback)
+
+    def record(self) -> None:
+        """Begin: what came so far is forgotten."""
+        self._recording = True
+        self.joints.clear()
+        self.phases.clear()
+        self.footfalls.clear()
+
+    def flush(self) -> None:
+        """Bring to the disk what has come so far."""
+        self._to_disk(lambda: [file.flush() for file in self._files])
+
+    def close(self) -> None:
+        """Close the files."""
+        self._to_disk(lambda: [file.close() for file in self._files])
+
+    def _to_disk(self, write: Callable[[], object]) -> None:
+        try:
+            write()
+        except OSError as error:  # a full disk ends the record, not what is there
+            self._recording = False
+            self.failure = f'{error.strerror}: {self._folder}'
+
+    def _on_joints(self, message: Any) -> None:
+        self.joints.append(self._joints_reader.read(message))
+
+    def _on_phase(self, message: Any) -> None:
+        phase = self._phase_reader.read(message)
+        self.age.renew()
+        self.phases.append(phase)
+        stamp_ns, front, rear, phi, difference, restarts = phase
+        if self._recording:
+            self._to_disk(lambda: self._samples.writerow((stamp_ns, *front, *rear, *phi, difference, restarts)))
+
+    def _on_error(self, message: Any) -> None:
+        self.errors += 1
+
+    def _on_synchronized(self, message: Any) -> None:
+        self.synchronized = message.data
+
+    def _on_footfall(self, message: Any) -> None:
+        fall = footfall(message)
+        self.footfalls.append(fall)
+        if self._recording:
+            self._to_disk(lambda: self._falls.writerow(fall))
+
+    def _on_diagnostics(self, message: Any) -> None:
+        for status in message.status:
+            self.diagnoses[status.name] = status.level[0], status.message

@@ -1,0 +1,76 @@
+"""Rig files: ROS 2 parameter files, so that one file serves the command line and every node."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+
+from dcdrw.executables import EXECUTABLES
+from dcdrw_msgs_py.quantity import build, fields, flatten
+from dcdrw_msgs_py.rig import RigParams
+from dcdrw_sim.simulator import SimulatorParams
+from dcdrw_tracker.phase import PhaseParams
+from dcdrw_tracker.sync import SyncParams
+
+_EVERY_NODE = '/**'
+_PARAMETERS = 'ros__parameters'
+_OF_ROS = ('use_sim_time',)
+_NODE_OF = {kind: node.name for node in EXECUTABLES for kind in node.parameters}
+
+
+class TrialParams(NamedTuple):
+    """The parameters of all nodes of a trial."""
+
+    rig: RigParams = RigParams()
+    simulator: SimulatorParams = SimulatorParams()
+    phase: PhaseParams = PhaseParams()
+    sync: SyncParams = SyncParams()
+
+
+def read_parameter_file(path: Path) -> TrialParams:
+    """Read a parameter file as the nodes of a trial will.
+
+    Raises:
+        ValueError: not YAML, not a parameter file, an unknown or impossible parameter: named with the file.
+        OSError: the file cannot be read.
+
+    """
+    try:
+        content = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ValueError(f'{path} is not YAML: {" ".join(str(error).split())}') from None
+    if not isinstance(content, dict) or not all(_is_section(section) for section in content.values()):
+        raise ValueError(f'{path} is not a parameter file: it must have the form of config/rig.yaml, '
+                         f'"{_EVERY_NODE}:", "{_PARAMETERS}:", then the parameters')
+    kinds = {name: type(default) for name, default in TrialParams._field_defaults.items()}
+    known = {field.name for kind in kinds.values() for field in fields(kind)}.union(_OF_ROS)
+    sets: dict[str, Any] = {}
+    for name, kind in kinds.items():
+        mine = {field.name for field in fields(kind)}
+        values = {key: value for section in (_EVERY_NODE, _NODE_OF[kind], f'/{_NODE_OF[kind]}')
+                  for key, value in _flatten(content.get(section, {}).get(_PARAMETERS) or {})}
+        sets[name] = build(kind, {key: value for key, value in values.items() if key in mine or key not in known},
+                           str(path))
+    return TrialParams(**sets)
+
+
+def write_parameter_file(params: TrialParams, path: Path) -> None:
+    """Write every parameter, each under the node that reads it; derived defaults are left to the nodes."""
+    content: dict[str, Any] = {}
+    for values in params:
+        given = {key: value for key, value in flatten(values).items() if value == value}  # NaN: derived
+        content.setdefault(_NODE_OF[type(values)], {_PARAMETERS: {}})[_PARAMETERS].update(given)
+    path.write_text(yaml.safe_dump(content, sort_keys=False, allow_unicode=True), encoding='utf-8')
+
+
+def _is_section(section: Any) -> bool:
+    return isinstance(section, dict) and isinstance(section.get(_PARAMETERS) or {}, dict) and _PARAMETERS in section
+
+
+def _flatten(tree: Mapping[str, Any], prefix: str = '') -> Iterator[tuple[str, Any]]:
+    for name, value in tree.items():
+        if isinstance(value, dict):
+            yield from _flatten(value, f'{prefix}{name}.')
+        else:
+            yield f'{prefix}{name}', value

@@ -1,0 +1,235 @@
+"""`dcdrw trial`: simulator, phase estimator and monitor as three processes, watched live and judged at the end."""
+
+import argparse
+import json
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from dcdrw.arguments import number, positive
+from dcdrw.figure import draw_trial
+from dcdrw.parameter_file import TrialParams, read_parameter_file, write_parameter_file
+from dcdrw.processes import NodeProcess, free_domain
+from dcdrw.summary import SECOND, TrialData, judge, summarize
+from dcdrw_msgs_py.quantity import check
+from dcdrw_msgs_py.samples import PhaseSample
+from dcdrw_tracker.diagnostics import phase_text
+from dcdrw_tracker.sync import SyncMonitor
+
+START_SECONDS = 30.0
+"""Limit for the nodes to start, find each other and let data through."""
+SILENCE_SECONDS = 3.0
+"""Without data for this long, a trial has failed."""
+PRESETS = {'paper': TrialParams()}
+
+_EPILOG = """\
+The nodes run on a free ROS domain that only this machine sees, unless --domain names one. DIR gets summary.json,
+trial.png, samples.csv, footfalls.csv and what each node printed. Exit status: 0 the trial ran to its end (whether
+or not the pair fell into step: see the summary), 1 a node died or no data came, 2 wrong input, 130 interrupted.
+"""
+
+
+class TrialError(Exception):
+    """The trial cannot go on."""
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        'trial', help='run a trial in simulation, live, and judge it', epilog=_EPILOG,
+        description='Run simulator, phase estimator and synchronization monitor as processes over DDS.',
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--preset', choices=sorted(PRESETS), default='paper', help='the rig (default: %(default)s)')
+    parser.add_argument('--rig', type=Path, metavar='FILE.yaml',
+                        help='parameters that differ from the preset: a ROS 2 parameter file, as config/rig.yaml')
+    parser.add_argument('--initial-phase', type=number, metavar='PERCENT',
+                        help='phase at the start, percent of a step (default: 21.6)')
+    parser.add_argument('--seconds', type=positive, default=10.0, help='length of the trial (default: %(default)g)')
+    parser.add_argument('--out', type=Path, metavar='DIR', help='where to write; must not exist, or be empty '
+                        '(default: trials/DATE-TIME)')
+    parser.add_argument('--domain', type=int, metavar='N', help='ROS domain to use instead of a free one')
+    parser.add_argument('--quiet', action='store_true', help='no live progress')
+    parser.set_defaults(run=trial, prog='dcdrw trial')
+
+
+def trial(options: argparse.Namespace) -> int:
+    """Run the command; returns the exit status."""
+    try:
+        import rclpy  # noqa: F401
+    except ImportError:
+        raise ValueError("a trial needs rclpy: source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' "
+                         'ros-jazzy-common-interfaces') from None
+    params = read_parameter_file(options.rig) if options.rig else PRESETS[options.preset]
+    if options.initial_phase is not None:
+        params = params._replace(simulator=check(
+            params.simulator._replace(initial_phase_percent=options.initial_phase), '--initial-phase'))
+    params.simulator.start(params.rig)  # an impossible start is told before anything runs
+    folder = _folder(options.out)
+    domain = options.domain if options.domain is not None else free_domain()
+    return _Trial(params, options, folder, domain).run()
+
+
+def _folder(chosen: Path | None) -> Path:
+    folder = chosen or Path('trials') / datetime.now().strftime('%Y%m%d-%H%M%S')
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise ValueError(f'{folder} exists already, not overwriting; choose another --out')
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+class _Trial:
+    """One trial from start to summary."""
+
+    def __init__(self, params: TrialParams, options: argparse.Namespace, folder: Path, domain: int) -> None:
+        self.params, self.options, self.folder, self.domain = params, options, folder, domain
+        self.nodes: list[NodeProcess] = []
+        self.interrupted = False
+
+    def run(self) -> int:
+        environment = {'ROS_DOMAIN_ID': str(self.domain)}
+        if self.options.domain is None:
+            environment |= {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+        os.environ.update(environment)
+        import rclpy
+        from rclpy.signals import SignalHandlerOptions
+
+        from dcdrw.observer import Observer
+        from dcdrw_msgs_py.node import make_executor
+
+        def interrupt(*_: object) -> None:
+            self.interrupted = True
+
+        with ExitStack() as stack:
+            for number_ in (signal.SIGINT, signal.SIGTERM):
+                stack.callback(signal.signal, number_, signal.signal(number_, interrupt))
+            rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+            stack.callback(rclpy.try_shutdown)
+            self.observer = Observer(self.folder)
+            stack.callback(self.observer.close)
+            self.executor = make_executor()
+            self.executor.add_node(self.observer)
+            stack.callback(self._stop_nodes)
+            failure = ''
+            try:
+                self._start_nodes(environment)
+                self._let_go()
+                self._watch()
+            except TrialError as error:
+                failure = str(error)
+        return self._finish(failure)
+
+    def _start_nodes(self, environment: dict[str, str]) -> None:
+        file = self.folder / 'parameters.yaml'
+        held = self.params.simulator._replace(paused=True)
+        write_parameter_file(self.params._replace(simulator=held), file)
+        for module in ('dcdrw_tracker.sync_monitor_node', 'dcdrw_tracker.phase_estimator_node',
+                       'dcdrw_sim.simulator_node'):
+            name = module.split('.')[1].removesuffix('_node')
+            self.nodes.append(NodeProcess(name, module, ['--ros-args', '--params-file', str(file)], environment,
+                                          self.folder / f'{name}.log'))
+        self._say('starting the nodes ...')
+        self._spin_until(lambda: self.observer.errors > 0, START_SECONDS,
+                         'no data came through the nodes: is another process interfering, or the machine too busy?')
+
+    def _let_go(self) -> None:
+        """Release the wheels, which were held until the whole chain was seen to work."""
+        from std_srvs.srv import SetBool
+        client = self.observer.create_client(SetBool, '/simulator/pause')
+        self._spin_until(client.service_is_ready, START_SECONDS, 'the service /simulator/pause was not found')
+        self.observer.record()
+        answer = client.call_async(SetBool.Request(data=False))
+        self._spin_until(answer.done, START_SECONDS, 'the simulator did not answer')
+
+    def _watch(self) -> None:
+        observer, monitor, fed = self.observer, SyncMonitor(self.params.sync), 0
+        shown = 0.0
+        while True:
+            self._spin_once()
+            while fed < len(observer.phases):
+                monitor.update(observer.phases[fed])
+                fed += 1
+            now = time.monotonic()
+            if now - shown >= (0.1 if sys.stdout.isatty() else 1.0):
+                observer.flush()
+                self._show(monitor)
+                shown = now
+            if self.interrupted or (fed and self._elapsed() >= self.options.seconds):
+                return
+            if observer.age.seconds > SILENCE_SECONDS:
+                raise TrialError(f'no data for {SILENCE_SECONDS:g} s')
+
+    def _elapsed(self) -> float:
+        phases = self.observer.phases
+        return (phases[-1].stamp_ns - phases[0].stamp_ns) / SECOND if phases else 0.0
+
+    def _show(self, monitor: SyncMonitor) -> None:
+        status, falls = monitor.status(), self.observer.footfalls
+        state = 'SYNCHRONIZED' if status.synchronized else 'STALLED' if status.stalled else 'CONVERGING'
+        front = sum(fall.wheel == 'front' for fall in falls)
+        self._say(f'{self._elapsed():5.1f} s  phase {phase_text(status.phase)}  error {status.error_percent:+5.1f} %  '
+                  f'n {status.step_difference:+d}  strikes {front} + {len(falls) - front}  {state}')
+
+    def _say(self, text: str) -> None:
+        if self.options.quiet:
+            return
+        if sys.stdout.isatty():
+            print(f'\r\x1b[K{text}', end='', flush=True)
+        else:
+            print(text, flush=True)
+
+    def _spin_until(self, condition: Callable[[], bool], limit: float, otherwise: str) -> None:
+        end = time.monotonic() + limit
+        while not condition():
+            if self.interrupted:
+                raise TrialError('interrupted before the start')
+            if time.monotonic() > end:
+                raise TrialError(otherwise)
+            self._spin_once()
+
+    def _spin_once(self) -> None:
+        self.executor.spin_once(timeout_sec=0.05)
+        for node in self.nodes:
+            if node.failure and not self.interrupted:
+                raise TrialError(node.failure)
+        if self.observer.failure:
+            raise TrialError(self.observer.failure)
+
+    def _stop_nodes(self) -> None:
+        for node in self.nodes:
+            node.interrupt()
+        for node in self.nodes:
+            node.wait()
+
+    def _finish(self, failure: str) -> int:
+        """Write what there is, whatever happened."""
+        observer = self.observer
+        if not self.options.quiet and sys.stdout.isatty():
+            print()
+        data = TrialData(self.params, observer.joints, _moving(observer.phases), observer.footfalls)
+        status, errors = judge(data)
+        summary = summarize(data, status, errors)
+        end = failure or ('interrupted' if self.interrupted else 'complete')
+        (self.folder / 'summary.json').write_text(
+            json.dumps({'end': end, **summary}, indent=1, ensure_ascii=False) + '\n', encoding='utf-8')
+        if data.phases:
+            try:
+                draw_trial(data, summary['sentence'], self.folder / 'trial.png')
+            except ValueError as error:
+                print(f'dcdrw trial: no picture: {error}', file=sys.stderr)
+        print(summary['sentence'])
+        print(f'Written: {self.folder}/')
+        if failure:
+            print(f'dcdrw trial: {failure}', file=sys.stderr)
+        return 1 if failure else 130 if self.interrupted else 0
+
+
+def _moving(phases: list[PhaseSample]) -> list[PhaseSample]:
+    """The samples from the moment that the wheels were let go."""
+    held = next((i for i, phase in enumerate(phases) if phase.front.rate or phase.rear.rate), 1)
+    return phases[max(held - 1, 0):]

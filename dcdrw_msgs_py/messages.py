@@ -1,0 +1,181 @@
+"""Between messages and samples. Joints are found by name, never by their place in the message."""
+
+import math
+from array import array
+from collections.abc import Sequence
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import PointStamped
+from sensor_msgs.msg import JointState
+
+from dcdrw_msgs_py.diagnosis import Diagnosis
+from dcdrw_msgs_py.samples import CouplerSample, Footfall, JointSample, PhaseSample, Turn
+from dcdrw_msgs_py.topics import (
+    COUPLER,
+    FRONT_STANCE,
+    FRONT_WHEEL,
+    PHI_JOINT,
+    REAR_STANCE,
+    REAR_WHEEL,
+    STEP_DIFFERENCE_JOINT,
+)
+
+SECOND = 1_000_000_000
+
+# The frame of phase_state tells runs apart: the counts start afresh when the source starts anew.
+_RUN = 'run_'
+
+
+def stamp_ns(stamp: Any) -> int:
+    """Nanoseconds of a message's stamp."""
+    return int(stamp.sec) * SECOND + int(stamp.nanosec)
+
+
+def to_stamp(nanoseconds: int) -> Any:
+    """Make a message's stamp."""
+    sec, nanosec = divmod(nanoseconds, SECOND)
+    return Time(sec=sec, nanosec=nanosec)
+
+
+class Joints:
+    """Reads chosen joints of JointState messages, whatever their order and company."""
+
+    def __init__(self, required: Sequence[str], optional: Sequence[str] = ()) -> None:
+        self._required, self._optional = tuple(required), tuple(optional)
+        self._names: list[str] | None = None
+        self._places: list[int] = []
+
+    def read(self, message: Any) -> list[tuple[float, float, float]]:
+        """Position, velocity and effort of each joint, required ones first; NaN where not given.
+
+        Raises:
+            ValueError: a required joint is missing, a name stands twice, or positions and names disagree.
+
+        """
+        if message.name != self._names:
+            self._places = self._find(list(message.name))
+            self._names = list(message.name)
+        count = len(message.name)
+        positions, velocities, efforts = message.position, message.velocity, message.effort
+        if len(positions) != count:
+            raise ValueError(f'{count} joints are named but {len(positions)} positions given')
+        speeds = velocities if len(velocities) == count else None
+        forces = efforts if len(efforts) == count else None
+        return [
+            (math.nan, math.nan, math.nan) if place < 0 else (
+                positions[place],
+                speeds[place] if speeds is not None else math.nan,
+                forces[place] if forces is not None else math.nan,
+            )
+            for place in self._places
+        ]
+
+    def _find(self, names: list[str]) -> list[int]:
+        missing = [name for name in self._required if name not in names]
+        if missing:
+            raise ValueError(f'joint {missing[0]} is missing; the message names {", ".join(names) or "none"}')
+        wanted = (*self._required, *self._optional)
+        twice = [name for name in wanted if names.count(name) > 1]
+        if twice:
+            raise ValueError(f'joint {twice[0]} stands twice in the message')
+        return [names.index(name) if name in names else -1 for name in wanted]
+
+
+class JointSampleReader:
+    """Reads `joint_states`; joints of other names are ignored."""
+
+    def __init__(self, front: str = FRONT_WHEEL, rear: str = REAR_WHEEL, coupler: str = COUPLER) -> None:
+        self._joints = Joints((front, rear), (coupler,))
+
+    def read(self, message: Any) -> JointSample:
+        """The sample in a message.
+
+        Raises:
+            ValueError: as `Joints.read`.
+
+        """
+        front, rear, coupler = self._joints.read(message)
+        return JointSample(stamp_ns(message.header.stamp), Turn(*front[:2]), Turn(*rear[:2]), CouplerSample(*coupler))
+
+
+class PhaseSampleReader:
+    """Reads `phase_state`."""
+
+    def __init__(self) -> None:
+        self._joints = Joints((FRONT_STANCE, REAR_STANCE, PHI_JOINT, STEP_DIFFERENCE_JOINT))
+
+    def read(self, message: Any) -> PhaseSample:
+        """The sample in a message.
+
+        Raises:
+            ValueError: as `Joints.read`, or a step difference that is no number.
+
+        """
+        front, rear, phi, (difference, _, _) = self._joints.read(message)
+        if not math.isfinite(difference):
+            raise ValueError(f'{STEP_DIFFERENCE_JOINT} must be a number, got {difference}')
+        return PhaseSample(
+            stamp_ns(message.header.stamp), Turn(*front[:2]), Turn(*rear[:2]), Turn(*phi[:2]), round(difference),
+            _restarts(message.header.frame_id))
+
+
+def _restarts(frame_id: str) -> int:
+    number = frame_id.removeprefix(_RUN)
+    return int(number) if number.isdecimal() else 0
+
+
+class JointSampleWriter:
+    """Writes `joint_states` into one message, which is used again and again."""
+
+    def __init__(self) -> None:
+        self._message = JointState(name=[FRONT_WHEEL, REAR_WHEEL, COUPLER])
+
+    def write(self, sample: JointSample) -> Any:
+        """The message of a sample; valid until the next call."""
+        message, (length, rate, force) = self._message, sample.coupler
+        message.header.stamp = to_stamp(sample.stamp_ns)
+        message.position = array('d', (sample.front.angle, sample.rear.angle, length))
+        message.velocity = array('d', (sample.front.rate, sample.rear.rate, rate))
+        message.effort = array('d', (math.nan, math.nan, force))
+        return message
+
+
+class PhaseSampleWriter:
+    """Writes `phase_state` into one message, which is used again and again."""
+
+    def __init__(self) -> None:
+        self._message = JointState(name=[FRONT_STANCE, REAR_STANCE, PHI_JOINT, STEP_DIFFERENCE_JOINT])
+
+    def write(self, sample: PhaseSample) -> Any:
+        """The message of a sample; valid until the next call."""
+        message, (_, front, rear, phi, difference, restarts) = self._message, sample
+        message.header.stamp = to_stamp(sample.stamp_ns)
+        message.header.frame_id = f'{_RUN}{restarts}'
+        message.position = array('d', (front.angle, rear.angle, phi.angle, difference))
+        message.velocity = array('d', (front.rate, rear.rate, phi.rate, 0.0))
+        return message
+
+
+def footfall_message(footfall: Footfall) -> Any:
+    """One strike as `footfalls` carries it."""
+    message = PointStamped()
+    message.header.stamp = to_stamp(footfall.stamp_ns)
+    message.header.frame_id = footfall.wheel
+    message.point.x, message.point.z = footfall.x, float(footfall.steps)
+    return message
+
+
+def footfall(message: Any) -> Footfall:
+    """The strike in a `footfalls` message."""
+    return Footfall(message.header.frame_id, stamp_ns(message.header.stamp), message.point.x, round(message.point.z))
+
+
+def diagnostics_message(name: str, diagnosis: Diagnosis, now_ns: int) -> Any:
+    """One node's diagnosis as `/diagnostics` carries it."""
+    values = [KeyValue(key=key, value=value) for key, value in diagnosis.values.items()]
+    status = DiagnosticStatus(level=bytes([diagnosis.level]), name=name, message=diagnosis.message, values=values)
+    message = DiagnosticArray(status=[status])
+    message.header.stamp = to_stamp(now_ns)
+    return message

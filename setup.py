@@ -1,0 +1,12 @@
+from glob import glob
+
+from setuptools import setup
+
+setup(data_files=[
+    ('share/ament_index/resource_index/packages', ['resource/dcdrw']),
+    ('share/dcdrw', ['package.xml']),
+    ('share/dcdrw/config', glob('config/*.yaml')),
+    ('share/dcdrw/launch', glob('launch/*.launch.py')),
+    # pip puts console scripts elsewhere, where `ros2 run` does not look; under colcon the generated ones win.
+    ('lib/dcdrw', glob('scripts/*')),
+])

@@ -1,0 +1,102 @@
+"""A bench for nodes: real processes over real DDS on a domain of their own, and a listener that waits for messages."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+
+from dcdrw.executables import EXECUTABLES
+from dcdrw.processes import free_domain
+from dcdrw_msgs_py.node import advertise, listen
+from dcdrw_msgs_py.topics import Topic
+
+MODULES = {node.name: node.module for node in EXECUTABLES}
+PATIENCE = 20.0
+"""Limit of every wait [s]: discovery alone can take seconds on a busy machine."""
+
+
+class Bench:
+    """Starts nodes, publishes, listens; ends everything when the test ends."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.domain = free_domain()
+        self.heard: dict[str, list[Any]] = defaultdict(list)
+        self.processes: list[subprocess.Popen[bytes]] = []
+        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+        self.context = Context()
+        rclpy.init(args=[], context=self.context, domain_id=self.domain)
+        self.node = rclpy.create_node('bench', context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+
+    def close(self) -> None:
+        for process in self.processes:
+            if process.poll() is None:
+                process.kill()
+            process.wait()
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+    def start(self, name: str, *arguments: str, **parameters: Any) -> subprocess.Popen[bytes]:
+        """Start a node with parameters; double underscores stand for dots."""
+        overrides = [part for key, value in parameters.items()
+                     for part in ('-p', f'{key.replace("__", ".")}:={str(value).lower()}')]
+        with (self.folder / f'{name}.log').open('ab') as log:
+            process = subprocess.Popen(
+                [sys.executable, '-m', MODULES[name], '--ros-args', *overrides, *arguments], stdout=log,
+                stderr=subprocess.STDOUT, env={**os.environ, 'ROS_DOMAIN_ID': str(self.domain)})
+        self.processes.append(process)
+        return process
+
+    def output(self, name: str) -> str:
+        return (self.folder / f'{name}.log').read_text()
+
+    def end(self, process: subprocess.Popen[bytes], number: int = signal.SIGINT) -> int:
+        """Send a signal and return the exit status."""
+        process.send_signal(number)
+        return process.wait(PATIENCE)
+
+    def hear(self, topic: Topic, name: str = '') -> list[Any]:
+        """Listen to a topic; the list fills as the bench spins."""
+        messages = self.heard[name or topic.name]
+        listen(self.node, topic._replace(name=name or topic.name), messages.append)
+        return messages
+
+    def publisher(self, topic: Topic, readers: int = 1) -> Any:
+        """Advertise a topic, and wait until a node listens."""
+        publisher = advertise(self.node, topic)
+        self.wait(lambda: publisher.get_subscription_count() >= readers, f'a listener of {topic.name}')
+        return publisher
+
+    def call(self, service_type: Any, name: str, request: Any) -> Any:
+        """Call a service and return its answer."""
+        client = self.node.create_client(service_type, name)
+        self.wait(client.service_is_ready, f'the service {name}')
+        answer = client.call_async(request)
+        self.wait(answer.done, f'an answer of {name}')
+        return answer.result()
+
+    def wait(self, condition: Callable[[], Any], what: str, limit: float = PATIENCE) -> Any:
+        """Spin until a condition holds; fail at the limit. Returns what the condition returned."""
+        end = time.monotonic() + limit
+        while not (result := condition()):
+            assert time.monotonic() < end, f'{what} did not come within {limit:g} s'
+            self.executor.spin_once(timeout_sec=0.02)
+        return result
+
+    def spin(self, seconds: float) -> None:
+        """Listen for a while; never in place of a condition."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.executor.spin_once(timeout_sec=0.02)
