@@ -8,13 +8,14 @@ import numpy as np
 
 from dcdrw.summary import SECOND, TrialData, pitch
 from dcdrw_msgs_py.rig import FRONT, REAR
+from dcdrw_tracker.sync import SyncStatus
 
 # Okabe and Ito's palette: told apart by the colour-blind, and in grey by lightness.
 _COLOURS = {FRONT: '#0072B2', REAR: '#D55E00'}
 _PHASE, _BAND, _FORCE = '#000000', '#009E73', '#555555'
 
 
-def draw_trial(data: TrialData, title: str, path: Path) -> None:
+def draw_trial(data: TrialData, status: SyncStatus, title: str, path: Path) -> None:
     """Draw a trial into a PNG, PDF or SVG file, by the ending of its name.
 
     Raises:
@@ -31,7 +32,7 @@ def draw_trial(data: TrialData, title: str, path: Path) -> None:
     angles, phase, gait, force = figure.subplots(4, 1, sharex=True, height_ratios=(3, 3, 1.3, 2))
     start_ns = data.phases[0].stamp_ns if data.phases else 0
     _draw_angles(angles, data, start_ns)
-    _draw_phase(phase, data, start_ns)
+    _draw_phase(phase, data, status, start_ns)
     _draw_gait(gait, data, start_ns)
     _draw_force(force, data, start_ns)
     force.set_xlabel('time [s]')
@@ -42,6 +43,10 @@ def draw_trial(data: TrialData, title: str, path: Path) -> None:
         axes.spines[['top', 'right']].set_visible(False)
     figure.align_ylabels()
     figure.savefig(path, dpi=120)
+
+
+def _legend(axes: Any) -> None:
+    axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False, borderaxespad=0.1)
 
 
 def _times(stamps: Any, start_ns: int) -> Any:
@@ -58,10 +63,10 @@ def _draw_angles(axes: Any, data: TrialData, start_ns: int) -> None:
                   linestyle='-' if wheel == FRONT else '--')
     axes.axhline(0.0, color='0.85', zorder=0, linewidth=0.8)
     axes.set_ylabel('stance angle [°]')
-    axes.legend(loc='lower right', ncols=2, framealpha=0.9)
+    _legend(axes)
 
 
-def _draw_phase(axes: Any, data: TrialData, start_ns: int) -> None:
+def _draw_phase(axes: Any, data: TrialData, status: SyncStatus, start_ns: int) -> None:
     time = _times([phase.stamp_ns for phase in data.phases], start_ns)
     step = math.degrees(pitch(data))
     phi = np.degrees([phase.phi.angle for phase in data.phases])
@@ -71,11 +76,15 @@ def _draw_phase(axes: Any, data: TrialData, start_ns: int) -> None:
                  label=f'±{data.params.sync.band_percent:g} % of 50 %')
     axes.axhline(step / 2, color=_BAND, linewidth=1)
     axes.plot(time, phi, color=_PHASE, linewidth=1.3, label='φ')
+    for fall in data.footfalls:
+        if fall.wheel == FRONT and fall.steps == status.steps_to_synchronization:
+            axes.axvline((fall.stamp_ns - start_ns) / SECOND, color=_BAND, linestyle=':', linewidth=1.5,
+                         label=f'from step {fall.steps} on')
     axes.set_ylim(0.0, step)
     axes.set_ylabel('phase difference φ [°]')
     percent = axes.secondary_yaxis('right', functions=(lambda deg: deg / step * 100, lambda p: p / 100 * step))
     percent.set_ylabel('[% of a step]')
-    axes.legend(loc='lower right', ncols=2, framealpha=0.9)
+    _legend(axes)
 
 
 def _draw_gait(axes: Any, data: TrialData, start_ns: int) -> None:

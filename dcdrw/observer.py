@@ -30,7 +30,7 @@ class Observer(Node):
         """Messages of the monitor: the whole chain works when the first has come."""
         self.synchronized = False
         self.failure = ''
-        self._recording = False
+        self._recording = self._moving = False
         self.diagnoses: dict[str, tuple[int, str]] = {}
         self.age = Age()
         self._joints_reader, self._phase_reader = JointSampleReader(), PhaseSampleReader()
@@ -45,19 +45,18 @@ class Observer(Node):
             listen(self, topic, callback)
 
     def record(self) -> None:
-        """Begin: what came so far is forgotten."""
+        """Begin with the last sample before the wheels move, which are now let go."""
         self._recording = True
-        self.joints.clear()
-        self.phases.clear()
-        self.footfalls.clear()
 
     def flush(self) -> None:
         """Bring to the disk what has come so far."""
-        self._to_disk(lambda: [file.flush() for file in self._files])
+        for file in self._files:
+            self._to_disk(file.flush)
 
     def close(self) -> None:
         """Close the files."""
-        self._to_disk(lambda: [file.close() for file in self._files])
+        for file in self._files:
+            self._to_disk(file.close)
 
     def _to_disk(self, write: Callable[[], object]) -> None:
         try:
@@ -67,15 +66,22 @@ class Observer(Node):
             self.failure = f'{error.strerror}: {self._folder}'
 
     def _on_joints(self, message: Any) -> None:
-        self.joints.append(self._joints_reader.read(message))
+        joints = self._joints_reader.read(message)
+        if self._moving:
+            self.joints.append(joints)
 
     def _on_phase(self, message: Any) -> None:
         phase = self._phase_reader.read(message)
         self.age.renew()
+        if not self._recording:
+            return
+        if not self._moving:
+            self.phases = [phase]
+            self._moving = bool(phase.front.rate or phase.rear.rate)
+            return
         self.phases.append(phase)
         stamp_ns, front, rear, phi, difference, restarts = phase
-        if self._recording:
-            self._to_disk(lambda: self._samples.writerow((stamp_ns, *front, *rear, *phi, difference, restarts)))
+        self._to_disk(lambda: self._samples.writerow((stamp_ns, *front, *rear, *phi, difference, restarts)))
 
     def _on_error(self, message: Any) -> None:
         self.errors += 1
@@ -85,8 +91,8 @@ class Observer(Node):
 
     def _on_footfall(self, message: Any) -> None:
         fall = footfall(message)
-        self.footfalls.append(fall)
-        if self._recording:
+        if self._moving:
+            self.footfalls.append(fall)
             self._to_disk(lambda: self._falls.writerow(fall))
 
     def _on_diagnostics(self, message: Any) -> None:

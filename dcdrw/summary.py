@@ -66,8 +66,8 @@ def sentence(data: TrialData, status: SyncStatus, errors: list[float]) -> str:
     start, band = 100.0 * status.initial_phase, data.params.sync.band_percent
     low, high = final_band(data, errors)
     if status.synchronized:
-        return (f'From {start:.1f} % to within ±{band:g} % of 50 % in {status.steps_to_synchronization} steps '
-                f'(25 % of a stride); in the last steps {50 + low:.1f} to {50 + high:.1f} %.')
+        return (f'From {start:.1f} % to within ±{band:g} % of 50 % of a step (25 % of a stride) in '
+                f'{status.steps_to_synchronization} steps; in the last ones {50 + low:.1f} to {50 + high:.1f} %.')
     if status.stalled:
         return f'From {start:.1f} %: the {" and the ".join(status.stalled)} wheel stalled after {status.steps} steps.'
     lost = 'Synchronization was lost' if status.lost else 'Not synchronized'

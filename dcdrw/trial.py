@@ -18,7 +18,6 @@ from dcdrw.parameter_file import TrialParams, read_parameter_file, write_paramet
 from dcdrw.processes import NodeProcess, free_domain
 from dcdrw.summary import SECOND, TrialData, judge, summarize
 from dcdrw_msgs_py.quantity import check
-from dcdrw_msgs_py.samples import PhaseSample
 from dcdrw_tracker.diagnostics import phase_text
 from dcdrw_tracker.sync import SyncMonitor
 
@@ -50,7 +49,7 @@ def add_command(commands: Any) -> None:
                         help='parameters that differ from the preset: a ROS 2 parameter file, as config/rig.yaml')
     parser.add_argument('--initial-phase', type=number, metavar='PERCENT',
                         help='phase at the start, percent of a step (default: 21.6)')
-    parser.add_argument('--seconds', type=positive, default=10.0, help='length of the trial (default: %(default)g)')
+    parser.add_argument('--seconds', type=positive, default=30.0, help='length of the trial (default: %(default)g)')
     parser.add_argument('--out', type=Path, metavar='DIR', help='where to write; must not exist, or be empty '
                         '(default: trials/DATE-TIME)')
     parser.add_argument('--domain', type=int, metavar='N', help='ROS domain to use instead of a free one')
@@ -69,7 +68,8 @@ def trial(options: argparse.Namespace) -> int:
     if options.initial_phase is not None:
         params = params._replace(simulator=check(
             params.simulator._replace(initial_phase_percent=options.initial_phase), '--initial-phase'))
-    params.simulator.start(params.rig)  # an impossible start is told before anything runs
+    start, _ = params.simulator.start(params.rig)  # an impossible start is told before anything runs
+    params = params._replace(phase=params.phase._replace(S0=start.S0))
     folder = _folder(options.out)
     domain = options.domain if options.domain is not None else free_domain()
     return _Trial(params, options, folder, domain).run()
@@ -211,7 +211,7 @@ class _Trial:
         observer = self.observer
         if not self.options.quiet and sys.stdout.isatty():
             print()
-        data = TrialData(self.params, observer.joints, _moving(observer.phases), observer.footfalls)
+        data = TrialData(self.params, observer.joints, observer.phases, observer.footfalls)
         status, errors = judge(data)
         summary = summarize(data, status, errors)
         end = failure or ('interrupted' if self.interrupted else 'complete')
@@ -219,7 +219,7 @@ class _Trial:
             json.dumps({'end': end, **summary}, indent=1, ensure_ascii=False) + '\n', encoding='utf-8')
         if data.phases:
             try:
-                draw_trial(data, summary['sentence'], self.folder / 'trial.png')
+                draw_trial(data, status, summary['sentence'], self.folder / 'trial.png')
             except ValueError as error:
                 print(f'dcdrw trial: no picture: {error}', file=sys.stderr)
         print(summary['sentence'])
@@ -228,8 +228,3 @@ class _Trial:
             print(f'dcdrw trial: {failure}', file=sys.stderr)
         return 1 if failure else 130 if self.interrupted else 0
 
-
-def _moving(phases: list[PhaseSample]) -> list[PhaseSample]:
-    """The samples from the moment that the wheels were let go."""
-    held = next((i for i, phase in enumerate(phases) if phase.front.rate or phase.rear.rate), 1)
-    return phases[max(held - 1, 0):]

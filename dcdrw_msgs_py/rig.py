@@ -9,12 +9,26 @@ FRONT = 'front'
 REAR = 'rear'
 
 
-class WheelParams(NamedTuple):
-    """One rimless wheel; the paper's wheel by default."""
+Length = Annotated[float, Quantity('hub to foot, ℓ', 'm', above=0.0)]
+Spokes = Annotated[float, Quantity('number of spokes, π/α; need not be whole', low=4.0)]
 
-    length: Annotated[float, Quantity('hub to foot, ℓ', 'm', above=0.0)] = 0.9652
-    mass: Annotated[float, Quantity('point mass at the hub, m', 'kg', above=0.0)] = 10.0
-    spokes: Annotated[float, Quantity('number of spokes, π/α; need not be whole', low=4.0)] = 12.0
+
+class WheelPitch(NamedTuple):
+    """How a wheel is divided: all that a phase needs."""
+
+    spokes: Spokes = 12.0
+
+    @property
+    def alpha(self) -> float:
+        """Half the angle between two spokes, α [rad]."""
+        return math.pi / self.spokes
+
+
+class WheelShape(NamedTuple):
+    """A wheel's geometry: what footholds need."""
+
+    length: Length = 0.9652
+    spokes: Spokes = WheelPitch().spokes
 
     @property
     def alpha(self) -> float:
@@ -25,6 +39,24 @@ class WheelParams(NamedTuple):
     def step_length(self) -> float:
         """Distance between two footholds, σ = 2 ℓ sin α [m] (paper's (14), with ℓ_i)."""
         return 2.0 * self.length * math.sin(self.alpha)
+
+
+class WheelParams(NamedTuple):
+    """One rimless wheel; the paper's wheel by default."""
+
+    length: Length = WheelShape().length
+    mass: Annotated[float, Quantity('point mass at the hub, m', 'kg', above=0.0)] = 10.0
+    spokes: Spokes = WheelShape().spokes
+
+    @property
+    def alpha(self) -> float:
+        """Half the angle between two spokes, α [rad]."""
+        return math.pi / self.spokes
+
+    @property
+    def step_length(self) -> float:
+        """Distance between two footholds, σ = 2 ℓ sin α [m]."""
+        return WheelShape(self.length, self.spokes).step_length
 
 
 StanceDistance = Annotated[

@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Annotated, Literal, NamedTuple, get_args
 
 from dcdrw_msgs_py.quantity import Quantity
-from dcdrw_msgs_py.rig import FRONT, REAR, WheelParams
+from dcdrw_msgs_py.rig import FRONT, REAR, StanceDistance, WheelShape
 from dcdrw_msgs_py.samples import Footfall, JointSample, PhaseSample, Turn
 from dcdrw_tracker.cadence import Cadence, CadenceStatus
 from dcdrw_tracker.rotation import Rotation, Strike, Tolerance
@@ -24,11 +24,9 @@ LARGEST_ROTATION = 1e9
 class PhaseParams(NamedTuple):
     """What the estimator must know of the rig, and how much noise it bears."""
 
-    front: WheelParams = WheelParams()
-    rear: WheelParams = WheelParams()
-    S0: Annotated[
-        float, Quantity('distance of the stance feet at the start, x1 − x2', 'm', derived='ℓ of the front wheel')
-    ] = math.nan
+    front: WheelShape = WheelShape()
+    rear: WheelShape = WheelShape()
+    S0: StanceDistance = math.nan
     hysteresis_deg: Annotated[
         float,
         Quantity('a strike counts back only when ψ recedes by more than this', 'deg', low=0.0, high=10.0, live=True),

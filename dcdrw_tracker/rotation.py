@@ -47,6 +47,7 @@ class Rotation:
         """Mean speed of the last second [rad/s]."""
         self._stamp_ns = stamp_ns
         self._raw = angle
+        self._turns = 0
         self._wraps: bool | None = False if abs(angle) > math.tau + self.pitch else None
         self._past = deque([(stamp_ns, angle)])
         self._cell = self._first_cell = math.floor((angle + alpha + tolerance.hysteresis) / self.pitch)
@@ -87,9 +88,11 @@ class Rotation:
         along = min(fastest, 2.0 * self.speed * dt + self.pitch) + slack
         against = min(fastest, self.pitch) + slack
         low, high = (-against, along) if self.pace >= 0.0 else (-along, against)
+        turns = self._turns
         if self._wraps or (self._wraps is None and not low <= moved <= high and not self.may_step(dt)):
-            moved -= math.tau * round((moved - self.pace * dt) / math.tau)
-        return self.psi + moved if low <= moved <= high else None
+            wraps = round((moved - self.pace * dt) / math.tau)
+            turns, moved = turns - wraps, moved - math.tau * wraps
+        return angle + math.tau * turns if low <= moved <= high else None
 
     def advance(self, stamp_ns: int, angle: float, psi: float, rate: float, tolerance: Tolerance) -> list[Strike]:
         """Move on to a rotation ψ that `continued` has found; return the strikes on the way there."""
@@ -104,6 +107,7 @@ class Rotation:
         self.rate = self._slope(stamp_ns, psi, moved / dt, strikes) if math.isnan(rate) else rate
         self.pace += (moved - self.pace * dt) / max(dt, PACE_MEMORY)
         self.psi, self._raw, self._stamp_ns = psi, angle, stamp_ns
+        self._turns = round((psi - angle) / math.tau)
         return strikes
 
     def _strikes(self, elapsed_ns: int, psi: float, hysteresis: float) -> list[Strike]:

@@ -9,7 +9,7 @@ from collections import deque
 from typing import Annotated, NamedTuple
 
 from dcdrw_msgs_py.quantity import Quantity
-from dcdrw_msgs_py.rig import FRONT, REAR, WheelParams
+from dcdrw_msgs_py.rig import FRONT, REAR, WheelPitch
 from dcdrw_msgs_py.samples import PhaseSample, SyncSample, Turn
 from dcdrw_tracker.cadence import Cadence, CadenceStatus
 from dcdrw_tracker.contraction import WINDOW, contraction
@@ -29,8 +29,8 @@ LONG_WAY = 0.1
 class SyncParams(NamedTuple):
     """What counts as synchronized, stalled and stale."""
 
-    front: WheelParams = WheelParams()
-    rear: WheelParams = WheelParams()
+    front: WheelPitch = WheelPitch()
+    rear: WheelPitch = WheelPitch()
     band_percent: Annotated[
         float, Quantity('the pair comes into step when the error is within this', '%', above=0.0, high=50.0, live=True)
     ] = 6.0

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from walking import ALPHA, PITCH, START_NS, STEP, keep, walk
 
-from dcdrw_msgs_py.rig import FRONT, REAR, WheelParams
+from dcdrw_msgs_py.rig import FRONT, REAR, WheelShape
 from dcdrw_msgs_py.samples import Footfall, JointSample, PhaseSample, Turn
 from dcdrw_tracker.phase import PhaseEstimator, PhaseParams, PhaseStatus, PhaseUpdate
 
@@ -73,7 +73,7 @@ def test_phi_is_theta1_minus_theta2_up_to_a_step() -> None:
 
 def test_footfalls_lie_a_step_apart_down_the_slope() -> None:
     _, falls, _ = run(walk(5.0).samples())
-    step = WheelParams().step_length
+    step = WheelShape().step_length
     for wheel, start in ((FRONT, 0.9652), (REAR, 0.0)):
         places = [fall.x for fall in falls if fall.wheel == wheel]
         assert places == pytest.approx([start + step * number for number in range(1, len(places) + 1)])
@@ -82,7 +82,7 @@ def test_footfalls_lie_a_step_apart_down_the_slope() -> None:
 
 
 def test_wheels_of_unequal_spokes_each_keep_their_own_step() -> None:
-    params = PhaseParams(front=WheelParams(spokes=12), rear=WheelParams(spokes=8))
+    params = PhaseParams(front=WheelShape(spokes=12), rear=WheelShape(spokes=8))
     samples = [JointSample(START_NS + 5_000_000 * i, Turn(0.005 * i, 1.0), Turn(0.005 * i, 1.0)) for i in range(1000)]
     phases, _, status = run(samples, params)
     turned = samples[-1].front.angle

@@ -1,0 +1,84 @@
+"""The whole chain in three processes."""
+
+import signal
+
+from bench import Bench
+from std_srvs.srv import SetBool
+
+from dcdrw_msgs_py.messages import PhaseSampleReader
+from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, PHASE_STATE, SYNC_ERROR_PERCENT, SYNCHRONIZED
+from dcdrw_sim.simulator import SimulatorParams
+from dcdrw_sim.trajectory import run
+
+# With a stiffer spring than the paper's the pair is in step within seconds.
+STIFF = {'k': 60.0, 'initial_phase_percent': 35.0, 'rate': 200.0}
+
+
+def start_chain(bench: Bench):
+    for name in ('sync_monitor', 'phase_estimator'):
+        bench.start(name)
+    return bench.start('simulator', paused=True, **STIFF)
+
+
+def monitor_says(diagnostics) -> tuple[int, str]:
+    said = [m.status[0] for m in diagnostics if m.status[0].name == 'sync_monitor']
+    return (said[-1].level[0], said[-1].message) if said else (-1, '')
+
+
+def let_go(bench: Bench) -> None:
+    assert bench.call(SetBool, '/simulator/pause', SetBool.Request(data=False)).success
+
+
+def test_estimate_is_the_truth_of_the_simulation(bench):
+    phases, falls, errors = bench.hear(PHASE_STATE), bench.hear(FOOTFALLS), bench.hear(SYNC_ERROR_PERCENT)
+    start_chain(bench)
+    bench.wait(lambda: errors, 'an error at the end of the chain')
+    let_go(bench)
+    bench.wait(lambda: len(falls) >= 16, 'sixteen strikes')
+    settings = SimulatorParams(initial_phase_percent=STIFF['initial_phase_percent'])
+    model = run(*settings.start(RigParams(k=STIFF['k'])), strikes=16)
+    read = PhaseSampleReader()
+    moving = [sample for sample in map(read.read, phases) if sample.front.rate]
+    start = moving[0].stamp_ns
+    # The footfalls are the strikes of the model: in order, interpolated between samples 5 ms apart.
+    assert [1 if fall.header.frame_id == 'front' else 2 for fall in falls[:16]] == [s.wheel for s in model.strikes]
+    for fall, strike in zip(falls, model.strikes, strict=False):
+        t = (fall.header.stamp.sec * 10**9 + fall.header.stamp.nanosec - start) / 1e9
+        assert abs(t - strike.t) < 2e-4
+    for sample in moving[:400]:
+        t = (sample.stamp_ns - start) / 1e9
+        if t > model.duration:
+            break
+        truth = model.at([t])
+        phase = (truth.rotation1[0] - truth.rotation2[0]) / (2 * RigParams().front.alpha) % 1.0
+        assert abs(sample.phi.angle / (2 * RigParams().front.alpha) - phase) < 1e-8
+        assert sample.step_difference == truth.steps1[0] - truth.steps2[0] or min(
+            abs(t - s.t) for s in model.strikes) < 1e-6
+
+
+def test_killed_simulator_is_stale_and_a_new_one_is_judged_afresh(bench):
+    verdicts, diagnostics = bench.hear(SYNCHRONIZED), bench.hear(DIAGNOSTICS)
+    errors = bench.hear(SYNC_ERROR_PERCENT)
+    simulator = start_chain(bench)
+    bench.wait(lambda: errors, 'an error at the end of the chain')
+    let_go(bench)
+    bench.wait(lambda: verdicts and verdicts[-1].data, 'synchronized')
+    bench.wait(lambda: monitor_says(diagnostics)[1].startswith('synchronized after'), 'a diagnosis that says so')
+
+    simulator.send_signal(signal.SIGKILL)
+    simulator.wait(10)
+    bench.wait(lambda: not verdicts[-1].data, 'the end of the verdict')
+    bench.wait(lambda: monitor_says(diagnostics)[0] == 3, 'STALE')
+
+    count = len(errors)
+    bench.start('simulator', k=60.0, initial_phase_percent=20.0, rate=200.0)
+    bench.wait(lambda: len(errors) > count + 100, 'errors of the new run')
+    bench.wait(lambda: monitor_says(diagnostics)[0] == 0, 'a monitor that has recovered')
+    for _ in range(3):  # as long as the error is far outside the band, nobody claims the contrary
+        if abs(errors[-1].data) > 10.0:
+            assert not verdicts[-1].data
+            assert monitor_says(diagnostics)[1].startswith('converging')
+        bench.spin(0.3)
+    bench.wait(lambda: verdicts[-1].data, 'synchronized again')
+    assert abs(errors[-1].data) < 8.0

@@ -1,0 +1,26 @@
+"""The docs say what the code does."""
+
+from pathlib import Path
+
+import pytest
+
+from dcdrw.parameter_file import TrialParams, read_parameter_file
+from dcdrw.tables import updated
+
+ROOT = Path(__file__).parent.parent
+
+
+def test_tables_of_the_readme_are_current():
+    text = (ROOT / 'README.md').read_text(encoding='utf-8')
+    assert updated(text) == text, 'run: python -m dcdrw.tables README.md'
+
+
+def test_a_table_without_a_place_is_told():
+    with pytest.raises(ValueError, match='no place for the tables'):
+        updated('<!-- table: topics -->\n<!-- end -->')
+
+
+def test_example_rig_is_the_default_rig():
+    read, default = read_parameter_file(ROOT / 'config' / 'rig.yaml').rig.resolved(), TrialParams().rig.resolved()
+    assert read._replace(slope=0.0) == default._replace(slope=0.0)
+    assert read.slope == pytest.approx(default.slope, abs=1e-4)
