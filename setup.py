@@ -2,7 +2,8 @@ from glob import glob
 
 from setuptools import setup
 
-setup(data_files=[
+# python_requires stands here because colcon cannot read it from setup.cfg.
+setup(python_requires='>=3.10', data_files=[
     ('share/ament_index/resource_index/packages', ['resource/dcdrw']),
     ('share/dcdrw', ['package.xml']),
     ('share/dcdrw/config', glob('config/*.yaml')),

@@ -167,4 +167,6 @@ def run(name: str, make_node: Callable[[], Node], args: list[str] | None = None)
         while not stopped.is_set() and rclpy.ok():
             executor.spin_once(timeout_sec=SPIN_SECONDS)
     rclpy.try_shutdown()
+    for number in (signal.SIGINT, signal.SIGTERM):  # Python itself ends now, and would die of a second signal
+        signal.signal(number, signal.SIG_IGN)
     return 0

@@ -35,18 +35,23 @@ class SimulatorParams(NamedTuple):
     command_timeout: Annotated[float, Quantity('a coupler_force_command older than this counts as 0', 's', above=0.0,
                                                live=True)] = 0.2
 
-    def start(self, rig: RigParams) -> State:
-        """The state at the start: as given, and from the initial phase where not.
+    def start(self, rig: RigParams) -> tuple[RigParams, State]:
+        """The rig and its state at the start: as given, and from the initial phase where not.
+
+        The phase start is just after a strike of the front wheel: the feet are then S0 + σ1 apart, as they are S0
+        apart just before it, where the spring is at rest at φ = α by the default of D0.
 
         Raises:
             ValueError: the slope is too gentle for the speeds that the initial phase asks for.
 
         """
+        rig = rig.resolved()
         given = (self.theta1, self.omega1, self.theta2, self.omega2)
         if not any(map(math.isnan, given)):
-            return State(*given)
+            return rig, State(*given)
         derived = start_state(rig, self.initial_phase_percent / 100.0)
-        return State(*(d if math.isnan(g) else g for g, d in zip(given, derived, strict=True)))
+        state = State(*(d if math.isnan(g) else g for g, d in zip(given, derived, strict=True)))
+        return rig._replace(S0=rig.S0 + rig.front.step_length), state
 
 
 class SimulatedRig:
@@ -65,7 +70,7 @@ class SimulatedRig:
 
     def reset(self) -> None:
         """Put the wheels back to the start; time is 0 again."""
-        self.simulation = Simulation(self._rig, self.params.start(self._rig))
+        self.simulation = Simulation(*self.params.start(self._rig))
 
     def configure(self, rig: RigParams) -> None:
         """Take a changed coupler or slope from now on.
@@ -74,7 +79,7 @@ class SimulatedRig:
             ValueError: the rig is impossible.
 
         """
-        self.simulation.rig = rig
+        self.simulation.rig = rig.resolved()
         self._rig = rig
 
     def read(self, t: float, stamp_ns: int, held: bool = False) -> JointSample | None:
@@ -86,7 +91,7 @@ class SimulatedRig:
             held: the wheels are held where they are, at rest.
 
         Raises:
-            HubsMetError: the hubs met on the way.
+            MotionError: the hubs met on the way, or the motion is too fast to follow.
 
         """
         params, motion = self.params, self.simulation.advance_to(t)

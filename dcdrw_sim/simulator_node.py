@@ -13,9 +13,11 @@ from dcdrw_msgs_py.messages import SECOND, JointSampleWriter, to_stamp
 from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.topics import CLOCK, COUPLER_FORCE_COMMAND, JOINT_STATES
-from dcdrw_sim.simulation import HubsMetError
+from dcdrw_sim.simulation import MotionError
 from dcdrw_sim.simulator import SimulatedRig, SimulatorParams, Timeline
 
+SHORTEST_TICK = 0.0005
+"""Samples that are due more often are published in bursts [s]."""
 BURST = 200
 """Samples per callback at most, so that services and parameters are served however far behind the pace is."""
 CLOCK_RATE = 100.0
@@ -46,20 +48,27 @@ class SimulatorNode(Node):
         self.create_service(Trigger, '~/reset', self._on_reset)
         self.create_service(SetBool, '~/pause', self._on_pause)
         report(self, self._diagnose)
-        self._restart()
         self._timer = self.create_timer(self._period(), self._tick, clock=steady_clock())
+        self._restart()
+        doing = 'holding the wheels' if self._paused else 'rolling'
+        self.get_logger().info(f'{doing}, {params.rate:g} samples per second')
 
     def _now(self) -> float:
         return float(self._pace_clock.now().nanoseconds) / SECOND
 
     def _period(self) -> float:
-        return min(max(1.0 / self._settings.value.rate, 0.0005), 0.02)
+        """Time from tick to tick [s]: a sample's, as far as a timer can follow."""
+        params = self._settings.value
+        pace = params.rate * params.real_time_factor
+        return max(1.0 / pace, SHORTEST_TICK) if pace else SHORTEST_TICK
 
     def _restart(self) -> None:
-        params, now = self._settings.value, self._now()
-        self._last_now = now
-        self._epoch_ns = CLOCK_START_NS if params.publish_clock else self._pace_clock.now().nanoseconds
-        self._timeline = Timeline(params.rate, params.real_time_factor, now)
+        params = self._settings.value
+        self._last_now = self._now()
+        # Samples fall due when the timer does: each is published as soon as it is due.
+        first_tick = self._last_now + self._timer.time_until_next_call() / SECOND
+        self._epoch_ns = CLOCK_START_NS if params.publish_clock else round(first_tick * SECOND)
+        self._timeline = Timeline(params.rate, params.real_time_factor, first_tick)
         self._next_clock = -math.inf
 
     def _tick(self) -> None:
@@ -85,7 +94,7 @@ class SimulatorNode(Node):
         stamp_ns = self._epoch_ns + round(due * SECOND)
         try:
             sample = self._rig.read(timeline.rig_time, stamp_ns, self._paused)
-        except HubsMetError as error:
+        except MotionError as error:
             self._failure = str(error)
             self.get_logger().error(f'stopped: {error}; ~/reset starts again')
             return

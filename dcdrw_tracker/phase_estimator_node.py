@@ -34,6 +34,7 @@ class PhaseEstimatorNode(Node):
         self._age = Age()
         report(self, self._diagnose)
         listen(self, JOINT_STATES, self._on_joints)
+        self.get_logger().info(f'waiting for the joints {params.front_joint} and {params.rear_joint}')
 
     def _on_joints(self, message: Any) -> None:
         try:

@@ -33,7 +33,8 @@ class Rotation:
 
     A strike counts at the first sample at or past the boundary between two spokes, so without lag, and counts
     back only beyond the hysteresis: noise never counts twice. A backward strike is the same, mirrored. A wheel
-    that starts within the hysteresis of a boundary has just struck, as in the standard start of a trial (ψ = −α).
+    that starts less than half the hysteresis before a boundary has just struck, as in the standard start of a trial
+    (ψ = −α) with noise.
     """
 
     def __init__(self, alpha: float, stamp_ns: int, angle: float, rate: float, tolerance: Tolerance) -> None:
@@ -50,7 +51,7 @@ class Rotation:
         self._turns = 0
         self._wraps: bool | None = False if abs(angle) > math.tau + self.pitch else None
         self._past = deque([(stamp_ns, angle)])
-        self._cell = self._first_cell = math.floor((angle + alpha + tolerance.hysteresis) / self.pitch)
+        self._cell = self._first_cell = math.floor((angle + alpha + 0.5 * tolerance.hysteresis) / self.pitch)
         low, high = self._boundaries()
         self._backward_at = low - tolerance.hysteresis if angle < low + tolerance.hysteresis else low
         self._forward_at = high

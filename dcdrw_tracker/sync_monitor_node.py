@@ -59,6 +59,7 @@ class SyncMonitorNode(Node):
         if synchronized != self._verdict:
             self._verdict = synchronized
             self._synchronized.publish(Bool(data=synchronized))
+            self.get_logger().info(self._diagnose().message)
 
     def _diagnose(self) -> Diagnosis:
         diagnosis = diagnose_sync(self._monitor.status(), self._age.seconds, self._settings.value.stale_after)
