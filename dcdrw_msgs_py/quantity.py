@@ -64,10 +64,10 @@ class Field(NamedTuple):
 
         """
         if self.kind in (int, float) and isinstance(value, (int, float)) and not isinstance(value, bool):
+            if not self.quantity.allows(_as_float(value)):
+                raise ValueError(f'{self.name} must be {self.requirement}, got {value!r}')
             if self.kind is int and value != int(value):
                 raise ValueError(f'{self.name} must be a whole number, got {value!r}')
-            if not self.quantity.allows(value):
-                raise ValueError(f'{self.name} must be {self.requirement}, got {value!r}')
             return self.kind(value)
         if self.kind in (bool, str) and isinstance(value, self.kind):
             return value
@@ -77,6 +77,13 @@ class Field(NamedTuple):
     def requirement(self) -> str:
         """The bounds with their unit, for messages."""
         return ' '.join(filter(None, (self.quantity.bounds or 'finite', self.quantity.unit)))
+
+
+def _as_float(value: float) -> float:
+    try:
+        return float(value)
+    except OverflowError:  # an integer beyond any double
+        return math.inf
 
 
 _KIND_NAMES: dict[type, str] = {int: 'a whole number', float: 'a number', bool: 'true or false', str: 'a string'}

@@ -1,0 +1,93 @@
+"""One ament_python package that pip and colcon install alike."""
+
+import ast
+import os
+import shutil
+import subprocess
+import sys
+from configparser import ConfigParser
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from dcdrw.executables import EXECUTABLES
+
+ROOT = Path(__file__).parent.parent
+PACKAGES = ('dcdrw_msgs_py', 'dcdrw_sim', 'dcdrw_tracker', 'dcdrw')
+COMMANDS = {'dcdrw', *(node.name for node in EXECUTABLES)}
+# Third-party modules and the package.xml key (rosdep) that brings each.
+KEYS = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml', 'matplotlib': 'python3-matplotlib'}
+OPTIONAL = {'numba', 'llvmlite'}
+
+
+def config() -> ConfigParser:
+    parser = ConfigParser()
+    parser.read(ROOT / 'setup.cfg')
+    return parser
+
+
+def manifest() -> ElementTree.Element:
+    return ElementTree.parse(ROOT / 'package.xml').getroot()
+
+
+def imported() -> set[str]:
+    """Top-level names that the packages and launch files import."""
+    names: set[str] = set()
+    for path in [*(path for package in PACKAGES for path in (ROOT / package).glob('*.py')), *ROOT.glob('launch/*.py')]:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import):
+                names |= {alias.name.split('.')[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                names.add((node.module or '').split('.')[0])
+    return names - set(sys.stdlib_module_names) - set(PACKAGES) - OPTIONAL
+
+
+def test_dependencies_are_exactly_what_is_imported():
+    named_in_topics = {'std_msgs', 'sensor_msgs', 'geometry_msgs', 'diagnostic_msgs', 'rosgraph_msgs'}
+    needed = {KEYS.get(name, name) for name in imported() | named_in_topics} | {'ros2launch'}
+    assert {element.text for element in manifest().findall('exec_depend')} == needed
+
+
+def test_versions_and_names_agree():
+    assert manifest().findtext('version') == config()['metadata']['version']
+    assert manifest().findtext('name') == config()['metadata']['name'] == 'dcdrw'
+    assert manifest().get('format') == '3'
+
+
+def test_each_executable_has_an_entry_point_and_a_script():
+    lines = config()['options.entry_points']['console_scripts'].strip().splitlines()
+    entries = dict(line.split(' = ') for line in lines)
+    assert entries == {'dcdrw': 'dcdrw.cli:main'} | {node.name: f'{node.module}:main' for node in EXECUTABLES}
+    for name, target in entries.items():
+        script = ROOT / 'scripts' / name
+        assert os.access(script, os.X_OK)
+        assert f'from {target.split(":")[0]} import main' in script.read_text()
+
+
+@pytest.fixture(scope='module')
+def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where pip installed a copy of the package; the copy keeps build files out of the tree."""
+    folder = tmp_path_factory.mktemp('pip')
+    source = folder / 'source'
+    shutil.copytree(ROOT, source, ignore=shutil.ignore_patterns('.venv*', '.git', 'build', '*.egg-info', 'trials'))
+    subprocess.run([sys.executable, '-m', 'pip', 'install', '--quiet', '--no-deps', '--no-build-isolation',
+                    '--prefix', folder / 'prefix', source], check=True, capture_output=True)
+    return folder / 'prefix'
+
+
+def test_pip_installs_what_ros2_run_looks_for(prefix):
+    assert {path.name for path in (prefix / 'lib' / 'dcdrw').iterdir() if os.access(path, os.X_OK)} == COMMANDS
+    assert (prefix / 'share/ament_index/resource_index/packages/dcdrw').exists()
+    for file in ('package.xml', 'config/rig.yaml', 'launch/trial.launch.py'):
+        assert (prefix / 'share' / 'dcdrw' / file).exists()
+    (site,) = prefix.glob('lib/python3*/site-packages')
+    assert {path.name for path in site.iterdir() if not path.name.endswith('-info')} == set(PACKAGES)
+
+
+def test_installed_command_runs(prefix):
+    (site,) = prefix.glob('lib/python3*/site-packages')
+    done = subprocess.run([sys.executable, prefix / 'lib' / 'dcdrw' / 'dcdrw', '--help'], capture_output=True,
+                          text=True, env={**os.environ, 'PYTHONPATH': str(site)}, check=False)
+    assert done.returncode == 0
+    assert 'simulate' in done.stdout
