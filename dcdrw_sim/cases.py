@@ -5,9 +5,9 @@ import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dcdrw_msgs_py.quantity import check
 from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_sim.dynamics import State
+from dcdrw_sim.simulation import Simulation
 from dcdrw_sim.strikes import Strike
 from dcdrw_sim.trajectory import Run
 
@@ -37,14 +37,17 @@ def read_cases(path: Path) -> tuple[list[Case], bool]:
     such an object under the key `case` beside its `strikes`.
 
     Raises:
-        ValueError: not JSON, or not a case: the message names the file, the case and the key.
+        ValueError: not JSON, not a case, or an impossible one: the message names the file, the case and the key.
+        OSError: the file cannot be read.
 
     """
     try:
         content = json.loads(path.read_text(encoding='utf-8'))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise ValueError(f'{path} is not JSON: {error}') from None
     entries = content if isinstance(content, list) else [content]
+    if not entries:
+        raise ValueError(f'{path} holds no case: the list is empty')
     return [_parse(entry, f'{path}, case {index}') for index, entry in enumerate(entries)], isinstance(content, list)
 
 
@@ -52,26 +55,39 @@ def _parse(entry: Any, where: str) -> Case:
     raw = entry.get('case', entry) if isinstance(entry, dict) else None
     if not isinstance(raw, dict):
         raise ValueError(f'{where}: must be an object with the keys {", ".join((*_NUMBERS, *_PAIRS, "x0"))}')
-    where = f'{where} ({raw["name"]})' if 'name' in raw else where
-    values = {key: _numbers(raw, key, 1, where)[0] for key in _NUMBERS}
-    length, mass, alpha = (_numbers(raw, key, 2, where) for key in _PAIRS)
+    name = str(raw.get('name', 'case'))
+    where = f'{where} ({name})' if 'name' in raw else where
+    g, slope, k, b, D0, S0 = (_numbers(raw, key, where)[0] for key in _NUMBERS)
+    length, mass, alpha = (_numbers(raw, key, where, 2) for key in _PAIRS)
     for angle in alpha:
         if not 0.0 < angle <= math.pi / 4:
             raise ValueError(f'{where}: alpha must be in (0, π/4] rad, got {angle}')
-    wheels = [WheelParams(length[i], mass[i], math.pi / alpha[i]) for i in (0, 1)]
-    rig = RigParams(wheels[0], wheels[1], values['k'], values['b'], values['D0'], values['S0'], values['slope'], values['g'])
+    front, rear = (WheelParams(*values) for values in zip(length, mass, (math.pi / a for a in alpha), strict=True))
+    rig = RigParams(front, rear, k, b, D0, S0, slope, g)
+    state = State(*_numbers(raw, 'x0', where, 4))
+    try:
+        Simulation(rig, state)
+    except ValueError as error:
+        raise ValueError(f'{where}: {error}') from None
     strikes = entry.get('strikes')
-    count = len(strikes) if isinstance(strikes, list) and strikes else DEFAULT_STRIKES
-    return Case(str(raw.get('name', 'case')), check(rig, where), State(*_numbers(raw, 'x0', 4, where)), count, raw)
+    return Case(name, rig, state, len(strikes) if isinstance(strikes, list) and strikes else DEFAULT_STRIKES, raw)
 
 
-def _numbers(raw: dict[str, Any], key: str, count: int, where: str) -> list[float]:
+def _numbers(raw: dict[str, Any], key: str, where: str, count: int = 1) -> list[float]:
     if key not in raw:
         raise ValueError(f'{where}: {key} is missing')
-    values = raw[key] if isinstance(raw[key], list) else [raw[key]]
-    if len(values) != count or not all(isinstance(v, (int, float)) and math.isfinite(v) for v in values):
-        raise ValueError(f'{where}: {key} must be {f"{count} finite numbers" if count > 1 else "a finite number"}, got {raw[key]!r}')
+    values = raw[key] if count > 1 else [raw[key]]
+    if not isinstance(values, list) or len(values) != count or not all(map(_is_number, values)):
+        wanted = f'{count} finite numbers' if count > 1 else 'a finite number'
+        raise ValueError(f'{where}: {key} must be {wanted}, got {raw[key]!r}')
     return [float(value) for value in values]
+
+
+def _is_number(value: Any) -> bool:
+    try:
+        return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:  # a whole number beyond every float
+        return False
 
 
 def strike_record(strike: Strike) -> dict[str, Any]:
@@ -81,5 +97,5 @@ def strike_record(strike: Strike) -> dict[str, Any]:
 
 def run_record(case: Case, run: Run) -> dict[str, Any]:
     """One case with its strikes and why it ended, in the format of the file that it came from."""
-    end = {'reason': run.end.name.lower(), 'meaning': run.end.meaning, 't': run.duration}
+    end = {'reason': run.end.name.lower(), 'meaning': run.reason, 't': run.duration}
     return {'case': case.raw, 'strikes': [strike_record(strike) for strike in run.strikes], 'end': end}

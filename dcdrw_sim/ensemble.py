@@ -8,12 +8,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from dcdrw_msgs_py.quantity import check
 from dcdrw_msgs_py.rig import RigParams
-from dcdrw_sim import taylor
+from dcdrw_sim import strikes, taylor
 from dcdrw_sim.compiled import compiled
-from dcdrw_sim.simulation import work_parameters
-from dcdrw_sim.strikes import BACKWARD, FORWARD, MIN_COUPLER_LENGTH, NONE, STALL_TIME, STANDING_SPEED, End, first_strike, reset
-from dcdrw_sim.taylor import (ALPHA1, ALPHA2, FIRST_PARAMETER, G1, G2, L1, L2, LANES, LENGTH, OMEGA1, OMEGA2,
-                              PARAMETERS, S, THETA1, THETA2, evaluate_lanes, expand, step_size)
+from dcdrw_sim.simulation import LEAVING_SPEED, LONGEST_STEP, SHORTEST_STEP, MotionError, work_parameters
+from dcdrw_sim.strikes import BACKWARD, FORWARD, NONE, End, first_strike, reset
+from dcdrw_sim.taylor import LANES, OMEGA1, OMEGA2, THETA1, THETA2, bare, expand, minimum, motion, rows, step_size
 
 Floats = NDArray[np.float64]
 
@@ -23,19 +22,20 @@ TOLERANCE = 5e-16
 STRIKE = np.dtype([('wheel', np.int8), ('direction', np.int8), ('t', float), ('state', float, (4,))])
 """One strike: wheel 1 or 2, direction, time [s], and the state just before it."""
 
-STATE = (taylor.THETA1, taylor.OMEGA1, taylor.THETA2, taylor.OMEGA2)
+STATE = (THETA1, OMEGA1, THETA2, OMEGA2)
 # Plain numbers, which compile.
-NONE_YET = -1
+TOO_FAST, NONE_YET, NO_PAIR = -2, -1, -1
 TIME_OVER, STRIKES, STANDING, FALLEN, STALLED, HUBS_MET = (int(end) for end in End)
 
 COLUMNS = {'k': taylor.K, 'b': taylor.B, 'D0': taylor.D0, 'S0': taylor.S}
 """Parameters that may differ from pair to pair, beside the slope."""
 
 # Rows of the work array behind those of the series.
-(AHEAD1, AHEAD_RATE1, AHEAD2, AHEAD_RATE2, STRIKE1, STRIKE2, HIT1, HIT2, MISS1, MISS2, VALUE, RATE, STEP, TIME, WHEEL, DIRECTION,
- S0, STRIDE1, STRIDE2, PATIENCE, SIZE) = range(taylor.END, taylor.END + 21 * LANES, LANES)
-NEWTON_ITERATIONS = 4
-"""From the chord's error of a few percent of a step down to rounding, mostly."""
+(PAIR, AHEAD1, AHEAD2, SLOWEST1, SLOWEST2, STRIKE1, STRIKE2, MISS1, MISS2, REACH, STEP, WHEEL, DIRECTION, S0, STRIDE1,
+ STRIDE2, SPEED1, SPEED2, UNIT, TIME, STEPS1, STEPS2, LAST1, LAST2, ROLLED1, ROLLED2, SIZE) = range(
+     taylor.END, taylor.END + 27 * LANES, LANES)
+NEWTON_ITERATIONS = 2
+"""From the error of the inverse cubic down to rounding, mostly."""
 CONVERGED = 1e-7
 """Last correction of Newton's method that leaves rounding error after it."""
 
@@ -53,7 +53,8 @@ class Ensemble(NamedTuple):
     """Time at each pair's end [s], shape (N,)."""
 
 
-def run_ensemble(rig: RigParams, states: ArrayLike, seconds: float, capacity: int, **columns: ArrayLike) -> Ensemble:
+def run_ensemble(rig: RigParams, states: ArrayLike, seconds: float, capacity: int, tolerance: float = TOLERANCE,
+                 **columns: ArrayLike) -> Ensemble:
     """Run many pairs of one rig, each with its own start and, where given, its own k, b, D0, S0 or slope.
 
     Args:
@@ -61,45 +62,65 @@ def run_ensemble(rig: RigParams, states: ArrayLike, seconds: float, capacity: in
         states: [θ1, ω1, θ2, ω2] of each pair, shape (N, 4).
         seconds: when to end.
         capacity: strikes to record of each pair; a pair with so many ends.
-        columns: k, b, D0, S0, slope: shape (N,) or a scalar.
+        tolerance: last term of the angles' series at the end of a step [rad].
+        columns: k, b, D0, S0, slope: shape (N,) or a scalar; NaN stands for the default.
 
     Raises:
-        ValueError: an impossible parameter, state or shape.
+        ValueError: an impossible parameter, state, limit or shape.
+        MotionError: a motion is too fast to follow.
 
     """
-    starts = np.ascontiguousarray(states, float)
+    rig, starts = check(rig), np.ascontiguousarray(states, float)
     if starts.ndim != 2 or starts.shape[1] != 4:
         raise ValueError(f'states must be of shape (N, 4), got {starts.shape}')
-    rig = check(rig).resolved()
+    if not (seconds >= 0.0 and capacity >= 1 and tolerance > 0.0):
+        raise ValueError('seconds must be ≥ 0, capacity ≥ 1 and tolerance > 0, '
+                         f'got {seconds}, {capacity} and {tolerance}')
     limits = np.array([rig.front.alpha, math.inf, rig.rear.alpha, math.inf]) * (1 + 1e-12)
-    if not (np.abs(starts) <= limits).all() or not np.isfinite(starts).all():
+    if not (np.isfinite(starts) & (np.abs(starts) <= limits)).all():
         raise ValueError('states must be finite, their angles within ±α of their wheels')
     count = len(starts)
+    parameters = _parameters(rig, count, columns)
     ensemble = Ensemble(np.zeros((count, capacity), STRIKE), np.zeros(count, np.int64), np.zeros(count, np.int64),
                         np.zeros(count))
-    _run(_aligned(SIZE), _parameters(rig, count, columns), starts, float(seconds), *ensemble)
+    if count:
+        with np.errstate(all='ignore'):
+            _run(_aligned(SIZE), parameters, starts, float(seconds), float(tolerance), *ensemble)
+    if (lost := np.flatnonzero(ensemble.ends == TOO_FAST)).size:
+        raise MotionError(f'the motion of pair {lost[0]} at t = {ensemble.durations[lost[0]]:.9g} s is too fast to '
+                          'follow')
     return ensemble
 
 
 def _parameters(rig: RigParams, count: int, columns: dict[str, ArrayLike]) -> Floats:
     """Parameter rows of each pair, shape (N, PARAMETERS), in the order of the work array."""
+    known = (*COLUMNS, 'slope')
+    if unknown := set(columns) - set(known):
+        raise ValueError(f'{", ".join(sorted(unknown))} cannot differ from pair to pair; {", ".join(known)} can')
+    values = {name: np.asarray(columns.get(name, getattr(rig, name)), float) for name in known}
+    for name, value in values.items():
+        if value.shape not in ((), (count,)):
+            raise ValueError(f'{name} must be a scalar or of shape ({count},), got {value.shape}')
+    # As `RigParams.resolved`, pair by pair.
+    front = rig.front
+    values['S0'] = np.where(np.isnan(values['S0']), front.length, values['S0'])
+    at_rest = np.maximum(values['S0'] + front.length * math.sin(front.alpha), 0.0)
+    values['D0'] = np.where(np.isnan(values['D0']), at_rest, values['D0'])
+    for extreme in (np.min, np.max) if count else ():
+        limits: dict[str, Any] = {name: float(extreme(value)) for name, value in values.items()}
+        rig = check(rig._replace(**limits))
     lane = [0.0] * SIZE
     work_parameters(lane, 0, rig)
-    lane[taylor.S] = rig.S0
-    parameters = np.tile(lane[FIRST_PARAMETER::LANES], (count, 1))
-    for name, values in columns.items():
-        values = np.asarray(values, float)
-        check(rig._replace(**{name: float(values.min())})), check(rig._replace(**{name: float(values.max())}))
-        if name == 'slope':
-            parameters[:, _column(taylor.COS_SLOPE)] = np.cos(values)
-            parameters[:, _column(taylor.SIN_SLOPE)] = np.sin(values)
-        else:
-            parameters[:, _column(COLUMNS[name])] = values
+    parameters = np.tile(lane[taylor.G1:taylor.END:LANES], (count, 1))
+    for name, row in COLUMNS.items():
+        parameters[:, _column(row)] = values[name]
+    parameters[:, _column(taylor.COS_SLOPE)] = np.cos(values['slope'])
+    parameters[:, _column(taylor.SIN_SLOPE)] = np.sin(values['slope'])
     return parameters
 
 
 def _column(row: int) -> int:
-    return (row - FIRST_PARAMETER) // LANES
+    return (row - taylor.FIRST_PARAMETER) // LANES
 
 
 def _aligned(size: int) -> Floats:
@@ -110,119 +131,183 @@ def _aligned(size: int) -> Floats:
 
 
 @compiled
-def _load(w: Any, l: int, parameters: Any, start: Any) -> None:
-    """Put a pair at its start into a lane."""
-    for row in range(PARAMETERS):
-        w[FIRST_PARAMETER + row * LANES + l] = parameters[row]
-    w[THETA1 + l], w[OMEGA1 + l], w[THETA2 + l], w[OMEGA2 + l] = start
-    w[S0 + l], w[TIME + l] = w[S + l], 0.0
-    w[STRIDE1 + l] = 2.0 * w[L1 + l] * math.sin(w[ALPHA1 + l])
-    w[STRIDE2 + l] = 2.0 * w[L2 + l] * math.sin(w[ALPHA2 + l])
-    w[PATIENCE + l] = STALL_TIME / math.sqrt(min(w[G1 + l], w[G2 + l]))
+def _guess_strike(start: Any, rate: Any, end: Any, end_rate: Any, aim: Any, step: Any) -> Any:
+    """When a wheel comes to an angle, were time a cubic of its angle: exact at both ends of the step."""
+    part = (aim - start) / (end - start)
+    rest = 1.0 - part
+    return part * part * (3.0 - 2.0 * part) * step + part * rest * (end - start) * (rest / rate - part / end_rate)
 
 
 @compiled
-def _strike_times(w: Any, theta: int, omega: int, alpha: int, ahead: int, strike: int) -> None:
-    """When each lane's wheel, rolling forward throughout its step, strikes: Newton's method from the chord.
+def _find_strikes(work: Any) -> None:
+    """When each wheel strikes if it rolls forward throughout its step; the step's end if it does not strike.
 
-    Fills the rows `strike`, and with them whether it strikes (HIT) and the last correction (MISS).
+    Newton's method, which aims at the strike or at where the step ends, whichever is nearer.
     """
-    hit, miss = strike + HIT1 - STRIKE1, strike + MISS1 - STRIKE1
-    for l in range(LANES):
-        w[hit + l] = 1.0 if w[ahead + l] >= w[alpha + l] else 0.0
-        chord = (w[alpha + l] - w[theta + l]) / (w[ahead + l] - w[theta + l])
-        w[strike + l] = w[STEP + l] * chord
+    w = rows(work, LANES)
+    step = w[STEP]
+    end1, rate1, end2, rate2 = motion(w, step, step)
+    aim1, aim2 = minimum(end1, w[taylor.ALPHA1]), minimum(end2, w[taylor.ALPHA2])
+    time1 = _guess_strike(w[THETA1], w[OMEGA1], end1, rate1, aim1, step)
+    time2 = _guess_strike(w[THETA2], w[OMEGA2], end2, rate2, aim2, step)
     for _ in range(NEWTON_ITERATIONS):
-        evaluate_lanes(w, VALUE, theta, strike, LANES)
-        evaluate_lanes(w, RATE, omega, strike, LANES)
-        for l in range(LANES):
-            correction = (w[VALUE + l] - w[alpha + l]) / w[RATE + l]
-            w[miss + l] = abs(correction) if w[hit + l] > 0.0 else 0.0
-            w[strike + l] = w[strike + l] - correction if w[hit + l] > 0.0 else w[STEP + l]
+        theta1, omega1, theta2, omega2 = motion(w, time1, time2)
+        correction1, correction2 = (theta1 - aim1) / omega1, (theta2 - aim2) / omega2
+        time1, time2 = time1 - correction1, time2 - correction2
+        w[MISS1], w[MISS2] = abs(correction1), abs(correction2)
+    w[STRIKE1], w[STRIKE2], w[AHEAD1], w[AHEAD2] = time1, time2, end1, end2
+    w[SLOWEST1], w[SLOWEST2] = minimum(w[OMEGA1], rate1), minimum(w[OMEGA2], rate2)
 
 
 @compiled
 def _cut_steps(w: Any) -> None:
     """End each lane's step at its first strike; set which wheel strikes (0: none), and which way."""
-    for i in range(4):
-        evaluate_lanes(w, AHEAD1 + i * LANES, STATE[i], STEP, LANES)
-    _strike_times(w, THETA1, OMEGA1, ALPHA1, AHEAD1, STRIKE1)
-    _strike_times(w, THETA2, OMEGA2, ALPHA2, AHEAD2, STRIKE2)
+    _find_strikes(w)
     for l in range(LANES):
-        slowest = min(min(w[OMEGA1 + l], w[OMEGA2 + l]), min(w[AHEAD_RATE1 + l], w[AHEAD_RATE2 + l]))
-        if slowest > 0.0 and max(w[MISS1 + l], w[MISS2 + l]) < CONVERGED:
-            front_first = w[HIT1 + l] > 0.0 and (w[HIT2 + l] == 0.0 or w[STRIKE1 + l] <= w[STRIKE2 + l])
-            w[WHEEL + l] = 1.0 if front_first else 2.0 * w[HIT2 + l]
-            w[DIRECTION + l] = FORWARD
-            w[STEP + l] = max(0.0, min(w[STRIKE1 + l], w[STRIKE2 + l]))
-        else:  # a wheel turns back or grazes its guard
-            w[WHEEL + l] = 0.0
-            for i in range(2):
-                alpha = w[ALPHA1 + i * LANES + l]
+        w[WHEEL + l] = 0.0
+        for i in range(2):
+            row = i * LANES + l
+            alpha = w[taylor.ALPHA1 + row]
+            if w[SLOWEST1 + row] > 0.0 and w[MISS1 + row] < CONVERGED:
+                t, direction = max(w[STRIKE1 + row], 0.0), FORWARD if w[AHEAD1 + row] >= alpha else NONE
+            else:  # it turns back or grazes its guard
                 t, direction = first_strike(w, STATE[2 * i], STATE[2 * i + 1], l, alpha, w[STEP + l])
-                if direction != NONE and (w[WHEEL + l] == 0.0 or t < w[STEP + l]):
-                    w[STEP + l], w[WHEEL + l], w[DIRECTION + l] = t, i + 1.0, direction
+            if direction != NONE and (w[WHEEL + l] == 0.0 or t < w[STEP + l]):
+                w[STEP + l], w[WHEEL + l], w[DIRECTION + l] = t, i + 1.0, direction
 
 
 @compiled
-def _record(w: Any, l: int, strike: Any, wheel: int, direction: int) -> None:
-    strike.wheel, strike.direction, strike.t = wheel, direction, w[TIME + l]
+def _acceleration(w: Any, l: int, i: int, theta: float, S: float) -> Any:
+    """The acceleration of wheel i were it at rest at an angle and a stance distance."""
+    l1, l2 = w[taylor.L1 + l], w[taylor.L2 + l]
+    theta1, theta2 = (theta, w[THETA2 + l]) if i == 0 else (w[THETA1 + l], theta)
+    p1 = l2 * math.sin(theta1 - theta2) + S * math.cos(theta1)
+    p2 = l1 * math.sin(theta1 - theta2) + S * math.cos(theta2)
+    dx, dy = l1 * math.sin(theta1) - l2 * math.sin(theta2) + S, l1 * math.cos(theta1) - l2 * math.cos(theta2)
+    length = math.sqrt(dx * dx + dy * dy)
+    rate = (-l2 * p2 * w[OMEGA2 + l] if i == 0 else l1 * p1 * w[OMEGA1 + l]) / length
+    pull = (w[taylor.K + l] * (length - w[taylor.D0 + l]) + w[taylor.B + l] * rate) / length
+    torque = -p1 * pull * w[taylor.INV_ML1 + l] if i == 0 else p2 * pull * w[taylor.INV_ML2 + l]
+    weight = math.sin(theta) * w[taylor.COS_SLOPE + l] + math.cos(theta) * w[taylor.SIN_SLOPE + l]
+    return w[taylor.G1 + i * LANES + l] * weight + torque
+
+
+@compiled
+def _rest(w: Any, l: int, i: int) -> Any:
+    """Whether wheel i, at rest on two spokes, stays so; else it is let go over the one it is pushed over.
+
+    As `Simulation`, to the same end: see `dcdrw_sim.dynamics.tipping`.
+    """
+    theta, row = STATE[2 * i] + l, i * LANES + l
+    alpha = w[taylor.ALPHA1 + row]
+    if w[theta] > 0.0:  # the same place, told from the forward spoke
+        w[STEPS1 + row] += 1.0
+    S, stride = _stance_distance(w, l), w[STRIDE1 + row]
+    forward, backward = _acceleration(w, l, i, -alpha, S), -_acceleration(w, l, i, alpha, S - stride)
+    if max(forward, backward) <= 0.0:
+        return True
+    way = 1.0 if forward >= backward else -1.0
+    if way < 0.0:
+        w[STEPS1 + row] -= 1.0
+    w[theta], w[STATE[2 * i + 1] + l], w[LAST1 + row] = -way * alpha, way * LEAVING_SPEED * w[SPEED1 + row], w[TIME + l]
+    return False
+
+
+@compiled
+def _stance_distance(w: Any, l: int) -> Any:
+    return w[S0 + l] + w[STEPS1 + l] * w[STRIDE1 + l] + w[STEPS2 + l] * w[STRIDE2 + l]
+
+
+@compiled
+def _load(w: Any, l: int, parameters: Any, start: Any) -> Any:
+    """Put a pair at its start into a lane; whether a wheel stands there."""
+    for row in range(taylor.PARAMETERS):
+        w[taylor.FIRST_PARAMETER + row * LANES + l] = parameters[row]
+    for row in range(TIME + l, SIZE, LANES):  # time, steps, and what happened last
+        w[row] = 0.0
+    w[THETA1 + l], w[OMEGA1 + l], w[THETA2 + l], w[OMEGA2 + l] = start
+    w[S0 + l] = w[taylor.S + l]
+    w[STRIDE1 + l] = 2.0 * w[taylor.L1 + l] * math.sin(w[taylor.ALPHA1 + l])
+    w[STRIDE2 + l] = -2.0 * w[taylor.L2 + l] * math.sin(w[taylor.ALPHA2 + l])
+    w[SPEED1 + l], w[SPEED2 + l] = math.sqrt(w[taylor.G1 + l]), math.sqrt(w[taylor.G2 + l])
+    w[UNIT + l] = 1.0 / min(w[SPEED1 + l], w[SPEED2 + l])
+    stands = False
+    for i in range(2):
+        if w[STATE[2 * i + 1] + l] == 0.0 and abs(w[STATE[2 * i] + l]) >= w[taylor.ALPHA1 + i * LANES + l]:
+            stands = _rest(w, l, i) or stands
+            w[taylor.S + l] = _stance_distance(w, l)
+    return stands
+
+
+@compiled
+def _record(w: Any, l: int, i: int, direction: int, record: Any) -> None:
+    """Note a strike of wheel i, its angle exactly on its guard."""
+    w[STATE[2 * i] + l] = direction * w[taylor.ALPHA1 + i * LANES + l]
+    record['wheel'], record['direction'], record['t'] = i + 1, direction, w[TIME + l]
     for j in range(4):
-        strike.state[j] = w[STATE[j] + l]
+        record['state'][j] = w[STATE[j] + l]
 
 
 @compiled
-def _run(w: Any, parameters: Any, starts: Any, seconds: float, strikes: Any, counts: Any, ends: Any, durations: Any) -> None:
+def _strike(w: Any, l: int, i: int, direction: int) -> int:
+    """Put wheel i on its next spoke; how the run ends with that, if it does."""
+    theta, omega, row = STATE[2 * i] + l, STATE[2 * i + 1] + l, i * LANES + l
+    w[theta], w[omega] = reset(w[taylor.ALPHA1 + row], w[omega], direction)
+    w[STEPS1 + row] += direction
+    fallen = direction == BACKWARD and w[ROLLED1 + row] == BACKWARD
+    w[LAST1 + row], w[ROLLED1 + row] = w[TIME + l], direction
+    stands = abs(w[omega]) < strikes.STANDING_SPEED * w[SPEED1 + row] and _rest(w, l, i)
+    w[taylor.S + l] = _stance_distance(w, l)
+    return FALLEN if fallen else STANDING if stands else NONE_YET
+
+
+@compiled
+def _run(work: Any, parameters: Any, starts: Any, seconds: float, tolerance: float, records: Any, counts: Any,
+         ends: Any, durations: Any) -> None:
     """Run every pair: each lane takes the next one when its own has ended, and never waits for another."""
-    total, capacity = strikes.shape
-    pair = np.full(LANES, -1)
-    steps, last_strike, last_direction = np.zeros((2, LANES)), np.zeros((2, LANES)), np.zeros((2, LANES))
+    w, lanes = bare(work), rows(bare(work), LANES)
+    total, capacity = records.shape
     following, active = 0, 0
-    for l in range(LANES):  # a lane without a pair computes what the first one does, and nobody looks
+    for l in range(LANES):  # a lane without a pair computes something, and nobody looks
         _load(w, l, parameters[0], starts[0])
+        w[PAIR + l] = NO_PAIR
     while True:
         for l in range(LANES):
-            if pair[l] < 0 and following < total:
-                _load(w, l, parameters[following], starts[following])
-                pair[l] = following
-                steps[:, l], last_strike[:, l], last_direction[:, l] = 0.0, 0.0, 0.0
-                following, active = following + 1, active + 1
+            while w[PAIR + l] == NO_PAIR and following < total:
+                if _load(w, l, parameters[following], starts[following]):
+                    ends[following] = STANDING
+                else:
+                    w[PAIR + l] = following
+                    active += 1
+                following += 1
         if active == 0:
             return
         expand(w, LANES)
         for l in range(LANES):
-            w[STEP + l] = min(step_size(w, l, TOLERANCE), seconds - w[TIME + l])
+            w[REACH + l] = min(step_size(w, l, tolerance), LONGEST_STEP * w[UNIT + l])
+            w[STEP + l] = max(0.0, min(w[REACH + l], seconds - w[TIME + l]))
         _cut_steps(w)
-        for i in range(4):
-            evaluate_lanes(w, STATE[i], STATE[i], STEP, LANES)
+        lanes[THETA1], lanes[OMEGA1], lanes[THETA2], lanes[OMEGA2] = motion(lanes, lanes[STEP], lanes[STEP])
+        lanes[TIME] = lanes[TIME] + lanes[STEP]
         for l in range(LANES):
-            w[TIME + l] += w[STEP + l]
-        for l in range(LANES):
-            end, mine = NONE_YET, pair[l]
-            if mine < 0:
+            if w[PAIR + l] == NO_PAIR:
                 continue
-            if w[LENGTH + l] < MIN_COUPLER_LENGTH * w[L1 + l]:
+            end, mine = NONE_YET, int(w[PAIR + l])
+            if not w[taylor.LENGTH + l] > strikes.MIN_COUPLER_LENGTH * w[taylor.L1 + l]:
                 end = HUBS_MET
+            elif not w[REACH + l] >= SHORTEST_STEP * w[UNIT + l]:
+                end = TOO_FAST
             elif w[WHEEL + l] > 0.0:
                 i, direction = int(w[WHEEL + l]) - 1, int(w[DIRECTION + l])
-                theta, omega, alpha = STATE[2 * i], STATE[2 * i + 1], w[ALPHA1 + i * LANES + l]
-                w[theta + l] = direction * alpha
-                _record(w, l, strikes[mine, counts[mine]], i + 1, direction)
+                _record(w, l, i, direction, records[mine, counts[mine]])
                 counts[mine] += 1
-                w[theta + l], w[omega + l] = reset(alpha, w[omega + l], direction)
-                steps[i, l] += direction
-                w[S + l] = w[S0 + l] + steps[0, l] * w[STRIDE1 + l] - steps[1, l] * w[STRIDE2 + l]
-                if abs(w[omega + l]) < STANDING_SPEED * math.sqrt(w[G1 + i * LANES + l]):
-                    end = STANDING
-                elif direction == BACKWARD and last_direction[i, l] == BACKWARD:
-                    end = FALLEN
-                elif counts[mine] == capacity:
+                end = _strike(w, l, i, direction)
+                if end == NONE_YET and counts[mine] == capacity:
                     end = STRIKES
-                last_strike[i, l], last_direction[i, l] = w[TIME + l], direction
-            elif w[TIME + l] - min(last_strike[0, l], last_strike[1, l]) > w[PATIENCE + l]:
-                end = STALLED
             if end == NONE_YET and w[TIME + l] >= seconds:
                 end = TIME_OVER
+            if end == NONE_YET and w[TIME + l] - min(w[LAST1 + l], w[LAST2 + l]) > strikes.STALL_TIME * w[UNIT + l]:
+                end = STALLED
             if end != NONE_YET:
-                ends[mine], durations[mine], pair[l] = end, w[TIME + l], -1
+                ends[mine], durations[mine], w[PAIR + l] = end, w[TIME + l], NO_PAIR
                 active -= 1

@@ -72,9 +72,13 @@ def crossing(w: Work, series: int, l: int, target: float, low: float, high: floa
     """
     at_low = evaluate(w, series, l, low) - target
     at_high = evaluate(w, series, l, high) - target
+    if at_high == 0.0 != at_low:
+        return high
     if at_low == 0.0 or (at_low > 0.0) == (at_high > 0.0):
         return low
-    t = low + (high - low) * at_low / (at_low - at_high)
+    near = 1e-10 * (high - low)
+    part = at_low / (at_low - at_high)
+    t = low + (high - low) * (part if low == 0.0 else math.sqrt(part))
     for _ in range(100):
         value, slope = 0.0, 0.0
         for j in range(series + ORDER * LANES + l, series + l - 1, -LANES):
@@ -85,13 +89,12 @@ def crossing(w: Work, series: int, l: int, target: float, low: float, high: floa
             high = t
         else:
             low = t
-        step = value / slope if slope != 0.0 else math.inf
-        following = t - step
-        if not low <= following <= high:
-            following = 0.5 * (low + high)
-        if abs(following - t) <= 1e-16 * (high + 1e-3):
-            return following
-        t = following
+        correction = value / slope if slope != 0.0 else math.inf
+        t -= correction
+        if abs(correction) <= near:
+            break
+        if not low <= t <= high:
+            t = 0.5 * (low + high)
     return t
 
 

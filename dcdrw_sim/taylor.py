@@ -1,134 +1,165 @@
 """Taylor series of the coupled wheels between two strikes, for one pair or for several side by side.
 
 All series and parameters lie in one flat work array: coefficient j of the series X, of lane l, is
-``w[X + j * LANES + l]``, and the lanes are the innermost loop of everything. The same functions serve a
-single pair, which uses one lane of a plain list and needs no compiler (`dcdrw_sim.simulation`), and an
-ensemble that fills all lanes and is compiled (`dcdrw_sim.ensemble`). Lanes are independent of each other:
-each has its own parameters, time and step.
+``w[X + j * LANES + l]``; the LANES numbers that start there are a row. The same functions serve a single pair,
+which uses one lane of a plain list and needs no compiler (`dcdrw_sim.simulation`), and an ensemble that fills
+all lanes and computes with whole rows (`dcdrw_sim.ensemble`). Lanes are independent of each other: each has its
+own parameters, time and step.
 
-The equations are the paper's (1)–(12) in the contract's shorter form, in which no coupler angle is needed:
+The equations are the paper's (1)–(12) in the contract's shorter form, in which no coupler angle is needed;
+with the difference δ = θ1 − θ2 as a third angle, the length of the coupler follows from the angles alone:
 
-    p1 = ℓ2 sin(θ1 − θ2) + S cos θ1          D Ḋ  = ℓ1 p1 ω1 − ℓ2 p2 ω2
-    p2 = ℓ1 sin(θ1 − θ2) + S cos θ2          F    = k (D − D0) + b Ḋ + F_ext
-    ω1' = g/ℓ1 sin(θ1 + γ) − p1 (F/D)/(m1 ℓ1)
-    ω2' = g/ℓ2 sin(θ2 + γ) + p2 (F/D)/(m2 ℓ2)
+    D²  = ℓ1² + ℓ2² + S² + 2 S (ℓ1 sin θ1 − ℓ2 sin θ2) − 2 ℓ1 ℓ2 cos δ
+    F   = k (D − D0) + b Ḋ + F_ext
+    ω1' = g/ℓ1 sin(θ1 + γ) − (ℓ2 sin δ + S cos θ1) (F/D)/(m1 ℓ1)
+    ω2' = g/ℓ2 sin(θ2 + γ) + (ℓ1 sin δ + S cos θ2) (F/D)/(m2 ℓ2)
 
-Products of series are convolutions (Jorba and Zou, Exp. Math. 14, 2005); D·Ḋ and D·(F/D), solved for
-the newest coefficient, give the quotients.
+Products of series are convolutions (Jorba and Zou, Exp. Math. 14, 2005). Sine and cosine follow from
+sin' = ω cos and cos' = −ω sin; D and F/D from D·D and D·(F/D), solved for the newest coefficient.
 """
 
 import math
 from collections.abc import MutableSequence
 from operator import mul
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 Work = MutableSequence[float]
 
 LANES = 16
 """Pairs side by side: two AVX-512 or four AVX2 registers."""
 ORDER = 16
-"""Degree of the angles' polynomials; a power of two, so that the step size takes square roots only."""
+"""Degree of the polynomials; a power of two, so that the step size takes square roots only."""
 
 _SERIES = (ORDER + 1) * LANES
-(THETA1, OMEGA1, THETA2, OMEGA2, SIN1, COS1, SIN2, COS2, P1, P2, LENGTH, RATE, PULL) = range(0, 13 * _SERIES, _SERIES)
-(SUM_A, SUM_B, SUM_C, SUM_D, G1, G2, COS_SLOPE, SIN_SLOPE, L1, L2, INV_ML1, INV_ML2, K, B, D0, FORCE, S, FREE1, FREE2,
- ALPHA1, ALPHA2, END) = range(13 * _SERIES, 13 * _SERIES + 22 * LANES, LANES)
+(THETA1, OMEGA1, SIN1, COS1, THETA2, OMEGA2, SIN2, COS2, OMEGA, SIN, COS, LEVER1, LEVER2, LENGTH, PULL) = range(
+    0, 15 * _SERIES, _SERIES)
+(SUM1, SUM2, SUM3, SUM4, SUM5, SUM6, G1, G2, COS_SLOPE, SIN_SLOPE, L1, L2, INV_ML1, INV_ML2,
+ K, B, D0, FORCE, S, FREE1, FREE2, ALPHA1, ALPHA2, END) = range(15 * _SERIES, 15 * _SERIES + 24 * LANES, LANES)
 FIRST_PARAMETER, PARAMETERS = G1, (END - G1) // LANES
 """Where the parameters begin, and how many there are."""
+
+Product = tuple[int, int, int]
+"""Where the coefficient goes, and the two factors."""
+_ROTATIONS = ((SUM1, COS1, OMEGA1), (SUM2, SIN1, OMEGA1), (SUM3, COS2, OMEGA2), (SUM4, SIN2, OMEGA2),
+              (SUM5, COS, OMEGA), (SUM6, SIN, OMEGA))
+_COUPLER = ((SUM1, LENGTH + LANES, LENGTH + LANES), (SUM2, LENGTH + LANES, PULL))  # without D's constant coefficient
+_TORQUES = ((SUM1, LEVER1, PULL), (SUM2, LEVER2, PULL))
 
 # Coefficients of sin x / x and cos x in powers of −x² as ratios of neighbours, highest first (Horner).
 _SIN = tuple(1.0 / ((2 * j) * (2 * j + 1)) for j in range(9, 0, -1))
 _COS = tuple(1.0 / ((2 * j - 1) * (2 * j)) for j in range(9, 0, -1))
 
 
-def convolve(w: Work, out: int, a: int, b: int, n: int, lanes: int) -> None:
-    """Store the n-th coefficient of the product of two series, Σ_{j=0}^{n} a_j b_{n−j}, at `out`."""
-    for l in range(lanes):
-        xs = w[a + l:a + l + n * LANES + 1:LANES]
-        ys = w[b + l:b + l + n * LANES + 1:LANES]
-        w[out + l] = sum(map(mul, xs, ys[::-1]), 0.0)
+def rows(w: Any, lanes: int) -> Any:
+    """A view of a work array in which ``[X]`` is one value: a number for one lane, else an array for all.
+
+    Compiled, that array is a vector (`dcdrw_sim.vectors`).
+    """
+    return w if lanes == 1 else _Rows(w)
 
 
-def evaluate_lanes(w: Work, out: int, series: int, times: int, lanes: int) -> None:
-    """Evaluate a series in every lane, at that lane's entry in the row `times`, into the row `out`."""
-    for l in range(lanes):
-        w[out + l] = evaluate(w, series, l, w[times + l])
+def bare(w: Any) -> Any:
+    """The work array; compiled, a bare pointer to it, free of bookkeeping."""
+    return w
 
 
-def sin_series(x: float) -> float:
-    """Sine of |x| ≤ π/4 to rounding; unlike the library's, it vectorizes."""
+class _Rows:
+    def __init__(self, w: NDArray[np.float64]) -> None:
+        self._rows = w.reshape(-1, LANES)
+
+    def __getitem__(self, at: Any) -> NDArray[np.float64]:
+        return self._rows[at // LANES if isinstance(at, int) else slice(at.start // LANES, (at.stop - 1) // LANES + 1)]
+
+    def __setitem__(self, at: int, row: Any) -> None:
+        self._rows[at // LANES] = row
+
+
+def convolve(w: Any, products: tuple[Product, ...], n: int) -> None:
+    """Store the n-th coefficient of each product of two series, Σ_{j=0}^{n} a_j b_{n−j}; zero for n = −1."""
+    for out, a, b in products:
+        w[out] = sum(map(mul, w[a:a + n * LANES + 1:LANES], w[b:b + n * LANES + 1:LANES][::-1]), 0.0)
+
+
+def sqrt(x: Any) -> Any:
+    """The square root of a number or a row."""
+    return x**0.5
+
+
+def minimum(x: Any, y: Any) -> Any:
+    """The smaller of two numbers or, lane by lane, of two rows."""
+    return np.minimum(x, y)
+
+
+def sin_series(x: Any) -> Any:
+    """Sine of |x| ≤ π/4, of a number or a row, to rounding."""
     y = x * x
-    total = 1.0
-    for c in _SIN:
+    total = 1.0 - y * _SIN[0]
+    for c in _SIN[1:]:
         total = 1.0 - y * c * total
     return x * total
 
 
-def cos_series(x: float) -> float:
-    """Cosine of |x| ≤ π/4 to rounding; unlike the library's, it vectorizes."""
+def cos_series(x: Any) -> Any:
+    """Cosine of |x| ≤ π/4, of a number or a row, to rounding."""
     y = x * x
-    total = 1.0
-    for c in _COS:
+    total = 1.0 - y * _COS[0]
+    for c in _COS[1:]:
         total = 1.0 - y * c * total
     return total
 
 
-def expand(w: Work, lanes: int) -> None:
+def expand(work: Any, lanes: int) -> None:
     """Expand the motion about the state: fill the series from coefficient 0 of the angles and speeds.
 
     Args:
-        w: work array, at least END long, with state and parameters set; angles within ±π/4.
-        lanes: how many of the LANES are in use.
+        work: work array, at least END long, with state and parameters set; angles within ±π/4.
+        lanes: 1 for a list, LANES for an array.
 
     """
-    for l in range(lanes):
-        w[SIN1 + l] = sin_series(w[THETA1 + l])
-        w[COS1 + l] = cos_series(w[THETA1 + l])
-        w[SIN2 + l] = sin_series(w[THETA2 + l])
-        w[COS2 + l] = cos_series(w[THETA2 + l])
-        dx = w[L1 + l] * w[SIN1 + l] - w[L2 + l] * w[SIN2 + l] + w[S + l]
-        dy = w[L1 + l] * w[COS1 + l] - w[L2 + l] * w[COS2 + l]
-        w[LENGTH + l] = math.sqrt(dx * dx + dy * dy)
+    w = rows(work, lanes)
+    l1, l2, stance = w[L1], w[L2], w[S]
+    sin1, cos1, sin2, cos2 = sin_series(w[THETA1]), cos_series(w[THETA1]), sin_series(w[THETA2]), cos_series(w[THETA2])
+    dx, dy = l1 * sin1 - l2 * sin2 + stance, l1 * cos1 - l2 * cos2
+    length = sqrt(dx * dx + dy * dy)
+    inverse = 1.0 / length
+    w[SIN1], w[COS1], w[SIN2], w[COS2] = sin1, cos1, sin2, cos2
+    w[SIN], w[COS] = sin1 * cos2 - cos1 * sin2, cos1 * cos2 + sin1 * sin2
+    w[OMEGA], w[LENGTH] = w[OMEGA1] - w[OMEGA2], length
     for order in range(ORDER):
-        n, last, following = order * LANES, (order - 1) * LANES, (order + 1) * LANES
-        if order > 0:  # sin' = cos ω, cos' = −sin ω
-            convolve(w, SUM_A, COS1, OMEGA1, order - 1, lanes)
-            convolve(w, SUM_B, SIN1, OMEGA1, order - 1, lanes)
-            convolve(w, SUM_C, COS2, OMEGA2, order - 1, lanes)
-            convolve(w, SUM_D, SIN2, OMEGA2, order - 1, lanes)
-            scale = 1.0 / order
-            for l in range(lanes):
-                w[SIN1 + n + l] = w[SUM_A + l] * scale
-                w[COS1 + n + l] = -w[SUM_B + l] * scale
-                w[SIN2 + n + l] = w[SUM_C + l] * scale
-                w[COS2 + n + l] = -w[SUM_D + l] * scale
-        convolve(w, SUM_A, SIN1, COS2, order, lanes)
-        convolve(w, SUM_B, COS1, SIN2, order, lanes)
-        for l in range(lanes):
-            sin_difference = w[SUM_A + l] - w[SUM_B + l]
-            w[P1 + n + l] = w[L2 + l] * sin_difference + w[S + l] * w[COS1 + n + l]
-            w[P2 + n + l] = w[L1 + l] * sin_difference + w[S + l] * w[COS2 + n + l]
-        convolve(w, SUM_A, P1, OMEGA1, order, lanes)
-        convolve(w, SUM_B, P2, OMEGA2, order, lanes)
-        convolve(w, SUM_C, LENGTH + LANES, RATE, order - 1, lanes)
-        convolve(w, SUM_D, LENGTH + LANES, PULL, order - 1, lanes)
-        scale = 1.0 / (order + 1)
-        for l in range(lanes):
-            rate = (w[L1 + l] * w[SUM_A + l] - w[L2 + l] * w[SUM_B + l] - w[SUM_C + l]) / w[LENGTH + l]
-            force = w[K + l] * w[LENGTH + n + l] + w[B + l] * rate
-            if order == 0:
-                force += w[FORCE + l] - w[K + l] * w[D0 + l]
-            w[RATE + n + l] = rate
-            w[PULL + n + l] = (force - w[SUM_D + l]) / w[LENGTH + l]
-            w[LENGTH + following + l] = rate * scale
-        convolve(w, SUM_A, P1, PULL, order, lanes)
-        convolve(w, SUM_B, P2, PULL, order, lanes)
-        for l in range(lanes):
-            weight1 = w[SIN1 + n + l] * w[COS_SLOPE + l] + w[COS1 + n + l] * w[SIN_SLOPE + l]
-            weight2 = w[SIN2 + n + l] * w[COS_SLOPE + l] + w[COS2 + n + l] * w[SIN_SLOPE + l]
-            w[THETA1 + following + l] = w[OMEGA1 + n + l] * scale
-            w[THETA2 + following + l] = w[OMEGA2 + n + l] * scale
-            w[OMEGA1 + following + l] = (w[G1 + l] * weight1 - w[SUM_A + l] * w[INV_ML1 + l]) * w[FREE1 + l] * scale
-            w[OMEGA2 + following + l] = (w[G2 + l] * weight2 + w[SUM_B + l] * w[INV_ML2 + l]) * w[FREE2 + l] * scale
+        n, following, scale = order * LANES, (order + 1) * LANES, 1.0 / (order + 1)
+        convolve(w, _ROTATIONS, order)
+        sin1, sin2, cos = w[SUM1] * scale, w[SUM3] * scale, -w[SUM6] * scale
+        w[SIN1 + following], w[COS1 + following] = sin1, -w[SUM2] * scale
+        w[SIN2 + following], w[COS2 + following] = sin2, -w[SUM4] * scale
+        w[SIN + following], w[COS + following] = w[SUM5] * scale, cos
+        convolve(w, _COUPLER, order - 1)
+        length = (stance * (l1 * sin1 - l2 * sin2) - l1 * l2 * cos - 0.5 * w[SUM1]) * inverse
+        force = w[K] * w[LENGTH + n] + w[B] * ((order + 1) * length)
+        if order == 0:
+            force = force + w[FORCE] - w[K] * w[D0]
+        w[LENGTH + following], w[PULL + n] = length, (force - w[SUM2]) * inverse
+        w[LEVER1 + n] = l2 * w[SIN + n] + stance * w[COS1 + n]
+        w[LEVER2 + n] = l1 * w[SIN + n] + stance * w[COS2 + n]
+        convolve(w, _TORQUES, order)
+        weight1 = w[SIN1 + n] * w[COS_SLOPE] + w[COS1 + n] * w[SIN_SLOPE]
+        weight2 = w[SIN2 + n] * w[COS_SLOPE] + w[COS2 + n] * w[SIN_SLOPE]
+        omega1 = (w[G1] * weight1 - w[SUM1] * w[INV_ML1]) * (w[FREE1] * scale)
+        omega2 = (w[G2] * weight2 + w[SUM2] * w[INV_ML2]) * (w[FREE2] * scale)
+        w[THETA1 + following], w[THETA2 + following] = w[OMEGA1 + n] * scale, w[OMEGA2 + n] * scale
+        w[OMEGA1 + following], w[OMEGA2 + following], w[OMEGA + following] = omega1, omega2, omega1 - omega2
+
+
+def motion(w: Any, t1: Any, t2: Any) -> tuple[Any, Any, Any, Any]:
+    """θ1, ω1 at a time t1 from the start of the series, θ2, ω2 at t2; of a number or a row."""
+    top = ORDER * LANES
+    theta1, omega1, theta2, omega2 = w[THETA1 + top], w[OMEGA1 + top], w[THETA2 + top], w[OMEGA2 + top]
+    for j in range(top - LANES, -1, -LANES):
+        theta1, omega1 = theta1 * t1 + w[THETA1 + j], omega1 * t1 + w[OMEGA1 + j]
+        theta2, omega2 = theta2 * t2 + w[THETA2 + j], omega2 * t2 + w[OMEGA2 + j]
+    return theta1, omega1, theta2, omega2
 
 
 def step_size(w: Work, l: int, tolerance: float) -> float:

@@ -4,13 +4,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import polynomial
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
 from dcdrw_sim.dynamics import State, coupler, coupler_force, stance_distance
 from dcdrw_sim.simulation import HubsMetError, Segment, Simulation
-from dcdrw_sim.strikes import BACKWARD, STALL_TIME, End, Strike
+from dcdrw_sim.strikes import BACKWARD, NONE, STALL_TIME, End, Strike
+
+WHEELS = (FRONT, REAR)
 
 Column = NDArray[np.float64]
 
@@ -46,80 +47,78 @@ class Run(NamedTuple):
     rig: RigParams
     strikes: list[Strike]
     segments: list[Segment]
+    """Without gaps from 0 to the end; at least one, but where the hubs met at once."""
     end: End
+    wheel: int = 0
+    """The wheel that stands, was pushed over or hangs: 1 the front, 2 the rear; 0 where no wheel is to blame."""
 
     @property
     def duration(self) -> float:
         """Time at the end [s]."""
         return self.segments[-1].end if self.segments else 0.0
 
-    def at(self, times: Column) -> Trajectory:
+    @property
+    def reason(self) -> str:
+        """Why it ended, in words that name the wheel."""
+        return self.end.meaning.replace('a wheel', f'the {WHEELS[self.wheel - 1]} wheel', 1 if self.wheel else 0)
+
+    def at(self, times: ArrayLike) -> Trajectory:
         """The motion at the given times [s], ascending or not; at a strike, the state after it.
 
         Raises:
             ValueError: a time outside the run.
 
         """
-        times = np.asarray(times, float)
-        if times.size and not (times.min() >= 0.0 and times.max() <= self.duration):
+        times = np.atleast_1d(np.asarray(times, float))
+        if not np.all((times >= 0.0) & (times <= self.duration)):
             raise ValueError(f'times must lie in [0, {self.duration:g}] s, got {times.min():g} to {times.max():g}')
-        starts = np.array([segment.start for segment in self.segments])
-        which = np.searchsorted(starts, times, side='right') - 1
-        theta = np.empty((2, times.size))
-        omega = np.empty_like(theta)
-        steps = np.empty_like(theta)
+        which = np.searchsorted([segment.start for segment in self.segments], times, side='right') - 1
+        motion, steps = np.empty((4, times.size)), np.empty((2, times.size))
         for index in np.unique(which):
-            segment, inside = self.segments[index], which == index
-            t = times[inside] - segment.start
-            for i, coefficients in enumerate((segment.theta1, segment.theta2)):
-                theta[i, inside] = polynomial.polyval(t, coefficients)
-                omega[i, inside] = polynomial.polyval(t, polynomial.polyder(coefficients))
-                steps[i, inside] = segment.steps[i]
-        state = State(theta[0], omega[0], theta[1], omega[1])
-        spring = coupler(self.rig, state, stance_distance(self.rig, steps[0], steps[1]))
+            inside = which == index
+            motion[:, inside] = self.segments[index].at(times[inside])
+            steps[:, inside] = np.reshape(self.segments[index].steps, (2, 1))
+        state, (steps1, steps2) = State(*motion), steps
+        spring = coupler(self.rig, state, stance_distance(self.rig, steps1, steps2))
         return Trajectory(
-            times, *state,
-            theta[0] + 2 * self.rig.front.alpha * steps[0], theta[1] + 2 * self.rig.rear.alpha * steps[1],
-            steps[0], steps[1], spring.length, spring.rate, coupler_force(self.rig, spring.length, spring.rate))
+            times, *state, state.theta1 + 2 * self.rig.front.alpha * steps1,
+            state.theta2 + 2 * self.rig.rear.alpha * steps2, steps1, steps2, spring.length, spring.rate,
+            coupler_force(self.rig, spring.length, spring.rate))
 
 
 def run(rig: RigParams, state: State, seconds: float = math.inf, strikes: float = math.inf) -> Run:
     """Run a pair until a time, a number of strikes, or an end of its own (`End`), whichever is first.
 
     Raises:
-        ValueError: impossible parameters or state, or neither limit given.
+        ValueError: impossible parameters or state, or no sensible limit.
+        MotionError: the motion is too fast to follow.
 
     """
-    if math.isinf(seconds) and math.isinf(strikes):
-        raise ValueError('a run needs a limit: seconds or strikes')
+    if not seconds >= 0.0 or not strikes >= 1 or (math.isinf(seconds) and math.isinf(strikes)):
+        raise ValueError(f'a run needs a limit, seconds ≥ 0 or strikes ≥ 1; got seconds {seconds}, strikes {strikes}')
     simulation = Simulation(rig, state)
     rig = simulation.rig
-    done: list[Strike] = []
-    segments: list[Segment] = []
-    last_direction = [0, 0]
-    stall_time = STALL_TIME * math.sqrt(max(rig.front.length, rig.rear.length) / rig.gravity)
-    end = End.TIME
-    while simulation.time < seconds:
-        if len(done) >= strikes:
-            end = End.STRIKES
-            break
-        try:
-            segment, strike = simulation.step(seconds)
-        except HubsMetError:
-            end = End.HUBS_MET
-            break
-        segments.append(segment)
-        if strike:
-            done.append(strike)
-            pushed_over = strike.direction == last_direction[strike.wheel - 1] == BACKWARD
-            last_direction[strike.wheel - 1] = strike.direction
-            if pushed_over:
-                end = End.FALLEN
-                break
+    patience = STALL_TIME * math.sqrt(max(rig.front.length, rig.rear.length) / rig.gravity)
+    result = Run(rig, [], [], End.TIME)
+    last_direction = [NONE, NONE]
+    while True:
         if any(simulation.standing):
-            end = End.STANDING
-            break
-        if simulation.time - min(simulation.last_strike) > stall_time:
-            end = End.STALLED
-            break
-    return Run(rig, done, segments, end)
+            return result._replace(end=End.STANDING, wheel=1 + simulation.standing.index(True))
+        if len(result.strikes) >= strikes:
+            return result._replace(end=End.STRIKES)
+        try:
+            segment, strike = simulation.step()
+        except HubsMetError:
+            return result._replace(end=End.HUBS_MET)
+        if segment.end > seconds:
+            result.segments.append(segment._replace(end=seconds))
+            return result
+        result.segments.append(segment)
+        if strike:
+            result.strikes.append(strike)
+            before, last_direction[strike.wheel - 1] = last_direction[strike.wheel - 1], strike.direction
+            if strike.direction == before == BACKWARD:
+                return result._replace(end=End.FALLEN, wheel=strike.wheel)
+        oldest = min(simulation.last_strike)
+        if simulation.time - oldest > patience:
+            return result._replace(end=End.STALLED, wheel=1 + simulation.last_strike.index(oldest))

@@ -1,0 +1,267 @@
+"""The ensemble's speed beside that of SciPy, of the scalar simulation and of heyoka, at matched accuracy.
+
+    python benchmarks/trajectories.py [--points 120] [--seconds 3]
+
+The workload is the paper's sweep, without dimensions: γ = 1.75°, S0 = 1, D0 = S0 + sin α, k̂ from 1e-4 to 1e-2 and b̂
+from 0.1 to 10 in even steps of their logarithms, seven initial θ2, the front wheel just after a strike, each wheel with
+the speed of its uncoupled limit cycle, 100 time units. Of it, `--points` trajectories are drawn, the same for all
+programs; those in which a wheel rolls back are left out, because only this project's own programs know how to follow
+them. All run on one core, which `taskset -c 1 python …` makes sure of.
+
+Read the table from left to right: microseconds per trajectory; how many trajectories the program makes in the time of
+one of SciPy's, measured in this same process; and the 99th percentile and the maximum of the errors of all strike
+times, against a reference made by the scalar simulation at a tolerance a hundred times tighter. The tolerances below
+are set so that the 99th percentile is just below 1e-9 for each, or as good as the program gets; 'missed' counts the
+trajectories with another number of strikes. `--seconds` is the time for which a program that is quick is repeated; the
+best repetition counts. A busy machine shows in all figures alike, so compare ratios.
+
+SciPy and heyoka are given the same form of the equations; heyoka, where it is installed, as expressions of its own,
+its strikes as terminal events, once one trajectory at a time and once in batches as wide as it recommends and twice so.
+Goal: the ensemble at least 500 times as fast as SciPy, and faster than heyoka's batches.
+"""
+
+import argparse
+import math
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from dcdrw_msgs_py.rig import RigParams
+from dcdrw_sim import simulation, trajectory
+from dcdrw_sim.compiled import AVAILABLE
+from dcdrw_sim.dynamics import State, limit_cycle_speed
+from dcdrw_sim.ensemble import TOLERANCE, run_ensemble
+from dcdrw_sim.presets import preset
+from dcdrw_sim.strikes import BACKWARD, End
+
+SCIPY_TOLERANCE = 2e-12
+HEYOKA_TOLERANCE = 1e-14
+REFERENCE_TOLERANCE = 1e-18
+
+SECONDS, CAPACITY = 100.0, 400
+RIG = preset('paper-sweep').resolved()
+ALPHA, STRIDE = RIG.front.alpha, RIG.front.step_length
+RESTITUTION = math.cos(2.0 * ALPHA)
+
+Floats = NDArray[np.float64]
+Strikes = list[list[float]]
+"""Strike times of each trajectory."""
+
+
+class Points(NamedTuple):
+    """N starts and their couplers."""
+
+    states: Floats
+    k: Floats
+    b: Floats
+
+    def __getitem__(self, which: Any) -> 'Points':  # type: ignore[override]
+        return Points(self.states[which], self.k[which], self.b[which])
+
+    def rows(self) -> Iterator[tuple[list[float], float, float]]:
+        return zip(self.states.tolist(), self.k.tolist(), self.b.tolist(), strict=True)
+
+
+def sweep(steps: int = 20) -> Points:
+    """All points of the sweep."""
+    k, b, theta2 = (axis.ravel() for axis in np.meshgrid(
+        np.logspace(-4, -2, steps), np.logspace(-1, 1, steps), np.radians([-12, -8, -4, 0, 4, 8, 12]), indexing='ij'))
+    speed = limit_cycle_speed(RIG.front, RIG.slope, RIG.gravity)
+    speeds = limit_cycle_speed(RIG.rear, RIG.slope, RIG.gravity, theta2)
+    return Points(np.column_stack([np.full_like(k, -ALPHA), np.full_like(k, speed), theta2, speeds]), k, b)
+
+
+def draw(points: Points, count: int) -> Points:
+    """Some points whose wheels keep rolling forward, at random but always the same."""
+    result = run_ensemble(RIG, points.states, SECONDS, CAPACITY, k=points.k, b=points.b)
+    forward = (result.ends == End.TIME) & ~(result.strikes['direction'] == BACKWARD).any(axis=1)
+    print(f'{forward.sum()} of the sweep\'s {len(forward)} trajectories roll forward all the time')
+    return points[np.random.default_rng(1).permutation(np.flatnonzero(forward))[:count]]
+
+
+# Programs: each makes the strike times of all points.
+
+def with_ensemble(points: Points) -> Strikes:
+    result = run_ensemble(RIG, points.states, SECONDS, CAPACITY, k=points.k, b=points.b)
+    return [times[:count].tolist() for times, count in zip(result.strikes['t'], result.counts, strict=True)]
+
+
+def with_simulation(points: Points) -> Strikes:
+    runs = (trajectory.run(RIG._replace(k=k, b=b), State(*state), SECONDS) for state, k, b in points.rows())
+    return [[strike.t for strike in run.strikes] for run in runs]
+
+
+def reference(points: Points) -> Strikes:
+    usual, simulation.TOLERANCE = simulation.TOLERANCE, REFERENCE_TOLERANCE
+    try:
+        return with_simulation(points)
+    finally:
+        simulation.TOLERANCE = usual
+
+
+def with_scipy(points: Points) -> Strikes:
+    return [scipy_strikes(*row) for row in points.rows()]
+
+
+def scipy_strikes(y: list[float], k: float, b: float) -> list[float]:
+    sin, cos, sqrt, slope, D0 = math.sin, math.cos, math.sqrt, RIG.slope, RIG.D0
+
+    def rates(t: float, y: Any, S: float) -> tuple[float, ...]:
+        theta1, omega1, theta2, omega2 = y.tolist()
+        sin1, cos1, sin2, cos2 = sin(theta1), cos(theta1), sin(theta2), cos(theta2)
+        sin_difference = sin1 * cos2 - cos1 * sin2
+        dx, dy = sin1 - sin2 + S, cos1 - cos2
+        length = sqrt(dx * dx + dy * dy)
+        p1, p2 = sin_difference + S * cos1, sin_difference + S * cos2
+        pull = (k * (length - D0) + b * (p1 * omega1 - p2 * omega2) / length) / length
+        return omega1, sin(theta1 + slope) - p1 * pull, omega2, sin(theta2 + slope) + p2 * pull
+
+    def front(t: float, y: Any, S: float) -> float:
+        return float(y[0]) - ALPHA
+
+    def rear(t: float, y: Any, S: float) -> float:
+        return float(y[2]) - ALPHA
+
+    for event in (front, rear):
+        event.terminal, event.direction = True, 1.0  # type: ignore[attr-defined]
+    t, S, times = 0.0, RIG.S0, []
+    while t < SECONDS:
+        solution = solve_ivp(rates, (t, SECONDS), y, 'DOP853', events=(front, rear), args=(S,),
+                             rtol=SCIPY_TOLERANCE, atol=SCIPY_TOLERANCE)
+        t, y = solution.t[-1], solution.y[:, -1].copy()
+        for i in (0, 1):
+            if solution.t_events[i].size:
+                times.append(float(t))
+                y[2 * i], y[2 * i + 1] = -ALPHA, y[2 * i + 1] * RESTITUTION
+                S += STRIDE if i == 0 else -STRIDE
+    return times
+
+
+class Heyoka:
+    """heyoka's adaptive Taylor integrator: `width` trajectories at once, its batch class where that is above one.
+
+    The runtime parameters are k, b and S; it is compiled when it is made.
+    """
+
+    def __init__(self, heyoka: Any, width: int) -> None:
+        theta1, omega1, theta2, omega2 = heyoka.make_vars('theta1', 'omega1', 'theta2', 'omega2')
+        k, b, S = (heyoka.par[i] for i in range(3))
+        sin, cos = heyoka.sin, heyoka.cos
+        length = heyoka.sqrt((sin(theta1) - sin(theta2) + S) ** 2.0 + (cos(theta1) - cos(theta2)) ** 2.0)
+        p1, p2 = sin(theta1 - theta2) + S * cos(theta1), sin(theta1 - theta2) + S * cos(theta2)
+        pull = (k * (length - RIG.D0) + b * (p1 * omega1 - p2 * omega2) / length) / length
+        equations = [(theta1, omega1), (omega1, sin(theta1 + RIG.slope) - p1 * pull),
+                     (theta2, omega2), (omega2, sin(theta2 + RIG.slope) + p2 * pull)]
+        event, integrator = ((heyoka.t_event, heyoka.taylor_adaptive) if width == 1 else
+                             (heyoka.t_event_batch, heyoka.taylor_adaptive_batch))
+        events = [event(theta - ALPHA, callback=self._strike(i, width), direction=heyoka.event_direction.positive)
+                  for i, theta in enumerate((theta1, theta2))]
+        shape = (4,) if width == 1 else (4, width)
+        self._width, self._strikes = width, [[] for _ in range(width)]  # type: Any, Strikes
+        self._integrator = integrator(equations, np.zeros(shape), tol=HEYOKA_TOLERANCE, t_events=events,
+                                      pars=np.ones((3, *shape[1:])))
+
+    def _strike(self, i: int, width: int) -> Any:
+        stride = (STRIDE, -STRIDE)[i]
+
+        def alone(integrator: Any, sign: int) -> bool:
+            self._strikes[0].append(integrator.time)
+            state = integrator.state
+            state[2 * i] = -ALPHA
+            state[2 * i + 1] *= RESTITUTION
+            integrator.pars[2] += stride
+            return True
+
+        def in_batch(integrator: Any, sign: int, lane: int) -> bool:
+            self._strikes[lane].append(integrator.time[lane])
+            state = integrator.state
+            state[2 * i, lane] = -ALPHA
+            state[2 * i + 1, lane] *= RESTITUTION
+            integrator.pars[2, lane] += stride
+            return True
+
+        return alone if width == 1 else in_batch
+
+    def __call__(self, points: Points) -> Strikes:
+        """Strike times of all points; the last batch is filled up with the last point."""
+        integrator, width, result = self._integrator, self._width, []  # type: Any, int, Strikes
+        for first in range(0, len(points.k), width):
+            which = np.minimum(np.arange(first, first + width), len(points.k) - 1)
+            integrator.set_time(0.0)
+            integrator.reset_cooldowns()
+            integrator.state[:] = points.states[which].T.reshape(integrator.state.shape)
+            for row, values in enumerate((points.k[which], points.b[which], np.full(width, RIG.S0))):
+                integrator.pars[row] = values if width > 1 else values[0]
+            self._strikes[:] = [[] for _ in range(width)]
+            integrator.propagate_until(SECONDS)
+            result += self._strikes[:len(points.k) - first]
+        return result
+
+
+# The table
+
+def measure(program: Callable[[Points], Strikes], points: Points, seconds: float) -> tuple[float, Strikes]:
+    """The best time per trajectory [µs], and the strikes."""
+    best, total = math.inf, 0.0
+    while total < seconds:
+        start = time.perf_counter()
+        strikes = program(points)
+        taken = time.perf_counter() - start
+        best, total = min(best, taken), total + taken
+    return 1e6 * best / len(points.k), strikes
+
+
+def accuracy(strikes: Strikes, truth: Strikes) -> tuple[Floats, int]:
+    """Errors of the strike times, and in how many trajectories their number is wrong."""
+    errors = [abs(a - b) for got, expected in zip(strikes, truth, strict=True)
+              for a, b in zip(got, expected, strict=False)]
+    missed = sum(len(got) != len(expected) for got, expected in zip(strikes, truth, strict=True))
+    return np.array(errors), missed
+
+
+def programs() -> Iterator[tuple[str, Callable[[Points], Strikes]]]:
+    """Every program, SciPy first, made when its turn comes."""
+    yield f'SciPy DOP853, {SCIPY_TOLERANCE:g}', with_scipy
+    yield f'scalar simulation, {simulation.TOLERANCE:g}', with_simulation
+    yield f'ensemble, {TOLERANCE:g}', with_ensemble
+    try:
+        import heyoka
+    except ImportError:
+        print('heyoka is not installed; to compare with it: pip install heyoka')
+        return
+    native = heyoka.recommended_simd_size()
+    for width in (1, native, 2 * native):
+        name = 'heyoka' if width == 1 else f'heyoka, batches of {width}'
+        yield f'{name}, {HEYOKA_TOLERANCE:g}', Heyoka(heyoka, width)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=str(__doc__).partition('\n')[0])
+    parser.add_argument('--points', type=int, default=120, help='trajectories that are drawn (default 120)')
+    parser.add_argument('--seconds', type=float, default=3.0, help='time to repeat each quick program [s] (default 3)')
+    options = parser.parse_args()
+    if not AVAILABLE:
+        print('numba is not installed, the ensemble runs as plain Python; to compile it: pip install numba')
+    points = draw(sweep(), options.points)
+    print(f'reference for {len(points.k)} of them …', file=sys.stderr)
+    truth = reference(points)
+    print(f'{"":34}{"µs":>10}{"× SciPy":>10}{"p99 error":>12}{"max error":>12}{"missed":>8}')
+    scipy_time = math.nan
+    for name, program in programs():
+        program(points[:2])  # compiles
+        print(f'{name} …', end='\r', file=sys.stderr)
+        taken, strikes = measure(program, points, options.seconds)
+        scipy_time = taken if math.isnan(scipy_time) else scipy_time
+        errors, missed = accuracy(strikes, truth)
+        print(f'{name:34}{taken:10.1f}{scipy_time / taken:10.1f}{np.quantile(errors, 0.99):12.1e}{errors.max():12.1e}'
+              f'{missed:8}', flush=True)
+
+
+if __name__ == '__main__':
+    main()
