@@ -197,21 +197,27 @@ def main() -> int:
     options = parser.parse_args()
     if options.bare:
         return run(f'bare {options.bare}', lambda: BareNode(options.bare, options.rates[0]), [])
-    os.environ.update(ROS_DOMAIN_ID=str(free_domain()), ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST')
-    rclpy.init()
+    with free_domain() as domain:
+        os.environ.update(ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST')
+        rclpy.init()
+        compare(options.rates, options.seconds)
+        rclpy.shutdown()
+    return 0
+
+
+def compare(rates: list[float], seconds: float) -> None:
+    """Measure both chains at each rate, and print the table."""
     print(f'{"chain":18} {"p50 µs":>9} {"p99 µs":>9} {"CPU % of a core":>20} {"in all":>7} {"sent":>8} {"lost":>6}')
-    for rate in options.rates:
+    for rate in rates:
         suite = [[sys.executable, '-m', module, '--ros-args', '-p', f'rate:={rate}', '-p', 'slope:=0.05']
                  for module in SUITE]
         bare = [[sys.executable, __file__, '--bare', role, '--rates', str(rate)] for role in ROLES]
-        results = [measure(suite, suite_errors, options.seconds), measure(bare, bare_errors, options.seconds)]
+        results = [measure(suite, suite_errors, seconds), measure(bare, bare_errors, seconds)]
         for name, result in zip(('suite', 'bare'), results, strict=True):
             print(row(f'{name} {rate:g} Hz', result), flush=True)
         ours, theirs = results
         p50, p99 = (np.percentile(ours.latencies, q) / np.percentile(theirs.latencies, q) for q in (50, 99))
         print(f'{"  ratio":18} {p50:9.2f} {p99:9.2f} {"":20} {sum(ours.cpu) / sum(theirs.cpu):7.2f}', flush=True)
-    rclpy.shutdown()
-    return 0
 
 
 if __name__ == '__main__':

@@ -9,7 +9,7 @@ from dcdrw import simulate, trial
 _DESCRIPTION = 'Two rimless wheels on a slope, joined by a spring and a damper: simulate them, run and judge trials.'
 _EPILOG = """\
 examples:
-  dcdrw trial                             the paper's trial, ten seconds, with summary and picture
+  dcdrw trial                             the paper's trial, half a minute, with summary and picture
   dcdrw trial --rig my_rig.yaml --initial-phase 35 --seconds 20
   dcdrw simulate case.json --strikes strikes.json --trajectory motion.csv --rate 200
 

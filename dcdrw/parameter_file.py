@@ -8,7 +8,7 @@ import yaml
 
 from dcdrw.executables import EXECUTABLES
 from dcdrw_msgs_py.quantity import build, fields, flatten
-from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.rig import RigParams, WheelPitch, WheelShape
 from dcdrw_sim.simulator import SimulatorParams
 from dcdrw_tracker.phase import PhaseParams
 from dcdrw_tracker.sync import SyncParams
@@ -27,9 +27,18 @@ class TrialParams(NamedTuple):
     phase: PhaseParams = PhaseParams()
     sync: SyncParams = SyncParams()
 
+    @classmethod
+    def of_rig(cls, rig: RigParams) -> 'TrialParams':
+        """A rig, and trackers that know its wheels."""
+        front, rear = rig.front, rig.rear
+        return cls(
+            rig,
+            phase=PhaseParams(WheelShape(front.length, front.spokes), WheelShape(rear.length, rear.spokes)),
+            sync=SyncParams(WheelPitch(front.spokes), WheelPitch(rear.spokes)))
 
-def read_parameter_file(path: Path) -> TrialParams:
-    """Read a parameter file as the nodes of a trial will.
+
+def read_parameter_file(path: Path, base: TrialParams) -> TrialParams:
+    """Read a parameter file as the nodes of a trial will; what it does not name is as in `base`.
 
     Raises:
         ValueError: not YAML, not a parameter file, an unknown or impossible parameter: named with the file.
@@ -43,15 +52,15 @@ def read_parameter_file(path: Path) -> TrialParams:
     if not isinstance(content, dict) or not all(_is_section(section) for section in content.values()):
         raise ValueError(f'{path} is not a parameter file: it must have the form of config/rig.yaml, '
                          f'"{_EVERY_NODE}:", "{_PARAMETERS}:", then the parameters')
-    kinds = {name: type(default) for name, default in TrialParams._field_defaults.items()}
+    kinds = {name: type(values) for name, values in base._asdict().items()}
     known = {field.name for kind in kinds.values() for field in fields(kind)}.union(_OF_ROS)
     sets: dict[str, Any] = {}
     for name, kind in kinds.items():
         mine = {field.name for field in fields(kind)}
         values = {key: value for section in (_EVERY_NODE, _NODE_OF[kind], f'/{_NODE_OF[kind]}')
                   for key, value in _flatten(content.get(section, {}).get(_PARAMETERS) or {})}
-        sets[name] = build(kind, {key: value for key, value in values.items() if key in mine or key not in known},
-                           str(path))
+        chosen = {key: value for key, value in values.items() if key in mine or key not in known}
+        sets[name] = build(kind, flatten(getattr(base, name)) | chosen, str(path))
     return TrialParams(**sets)
 
 

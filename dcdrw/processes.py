@@ -6,6 +6,8 @@ import signal
 import socket
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 _STOP_SECONDS = 5.0
@@ -13,20 +15,24 @@ _DOMAINS = range(1, 102)
 """Domains whose ports lie below Linux's ephemeral ones."""
 
 
-def free_domain() -> int:
-    """A ROS domain that no participant on this machine uses.
+@contextmanager
+def free_domain() -> Iterator[int]:
+    """A ROS domain that no participant on this machine uses, kept from other trials for as long as it is entered.
 
     Raises:
         OSError: every domain is in use.
 
     """
     for domain in random.sample(_DOMAINS, len(_DOMAINS)):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as claim:
             try:
-                probe.bind(('', 7410 + 250 * domain))  # where a domain's first participant listens (DDSI-RTPS 9.6.1)
+                claim.bind(f'\0dcdrw/domain/{domain}')  # an abstract name, which goes with the process
+                with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+                    probe.bind(('', 7410 + 250 * domain))  # a domain's first participant (DDSI-RTPS 9.6.1)
             except OSError:
                 continue
-            return domain
+            yield domain
+            return
     raise OSError('no free ROS domain on this machine; name one with --domain')
 
 

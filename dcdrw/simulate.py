@@ -46,7 +46,7 @@ def simulate(options: argparse.Namespace) -> int:
     for case in cases:
         result = run(case.rig, case.state, strikes=options.count or case.listed_strikes)
         runs.append(result)
-        print(f'{case.name}: {len(result.strikes)} strikes in {result.duration:.6g}; {result.end.meaning}',
+        print(f'{case.name}: {len(result.strikes)} strikes in {result.duration:.6g}; {result.reason}',
               file=sys.stderr)
     records = [run_record(case, result) for case, result in zip(cases, runs, strict=True)]
     text = json.dumps(records if is_list else records[0], indent=1)

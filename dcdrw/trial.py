@@ -7,7 +7,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from dcdrw.parameter_file import TrialParams, read_parameter_file, write_paramet
 from dcdrw.processes import NodeProcess, free_domain
 from dcdrw.summary import SECOND, TrialData, judge, summarize
 from dcdrw_msgs_py.quantity import check
+from dcdrw_sim.presets import PRESETS
 from dcdrw_tracker.diagnostics import phase_text
 from dcdrw_tracker.sync import SyncMonitor
 
@@ -25,7 +26,6 @@ START_SECONDS = 30.0
 """Limit for the nodes to start, find each other and let data through."""
 SILENCE_SECONDS = 3.0
 """Without data for this long, a trial has failed."""
-PRESETS = {'paper': TrialParams()}
 
 _EPILOG = """\
 The nodes run on a free ROS domain that only this machine sees, unless --domain names one. DIR gets summary.json,
@@ -44,7 +44,9 @@ def add_command(commands: Any) -> None:
         'trial', help='run a trial in simulation, live, and judge it', epilog=_EPILOG,
         description='Run simulator, phase estimator and synchronization monitor as processes over DDS.',
         formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--preset', choices=sorted(PRESETS), default='paper', help='the rig (default: %(default)s)')
+    parser.add_argument('--preset', choices=PRESETS, default='paper', metavar='NAME',
+                        help=f'the rig: {"; ".join(f"{name}, {preset.doc}" for name, preset in PRESETS.items())} '
+                        '(default: %(default)s)')
     parser.add_argument('--rig', type=Path, metavar='FILE.yaml',
                         help='parameters that differ from the preset: a ROS 2 parameter file, as config/rig.yaml')
     parser.add_argument('--initial-phase', type=number, metavar='PERCENT',
@@ -64,15 +66,17 @@ def trial(options: argparse.Namespace) -> int:
     except ImportError:
         raise ValueError("a trial needs rclpy: source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' "
                          'ros-jazzy-common-interfaces') from None
-    params = read_parameter_file(options.rig) if options.rig else PRESETS[options.preset]
+    params = TrialParams.of_rig(PRESETS[options.preset].rig)
+    if options.rig:
+        params = read_parameter_file(options.rig, params)
     if options.initial_phase is not None:
         params = params._replace(simulator=check(
             params.simulator._replace(initial_phase_percent=options.initial_phase), '--initial-phase'))
     start, _ = params.simulator.start(params.rig)  # an impossible start is told before anything runs
     params = params._replace(phase=params.phase._replace(S0=start.S0))
     folder = _folder(options.out)
-    domain = options.domain if options.domain is not None else free_domain()
-    return _Trial(params, options, folder, domain).run()
+    with nullcontext(options.domain) if options.domain is not None else free_domain() as domain:
+        return _Trial(params, options, folder, domain).run()
 
 
 def _folder(chosen: Path | None) -> Path:

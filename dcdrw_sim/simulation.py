@@ -141,14 +141,15 @@ class Simulation:
         self._force = 0.0
         self._series_start = 0.0
         self._ahead: _Ahead | None = None
+        self._untold: list[Strike] = []
         self._steps_taken, self._checked = 0, 0.0
         self._work = [0.0] * taylor.END
         self._write_state(state)
         self._write_parameters()
+        self._require_length()
         for i, wheel in enumerate(self._wheels):
             if state[2 * i + 1] == 0.0 and abs(state[2 * i]) >= wheel.alpha:
                 self._rest(i)
-        self._require_length()
 
     @property
     def rig(self) -> RigParams:
@@ -221,27 +222,34 @@ class Simulation:
         """
         if not self.time <= time < math.inf:
             raise ValueError(f'time must be finite and not before {self.time} s, got {time} s')
-        strikes = []
-        while self._look_ahead().end <= time:
-            _, strike = self.step()
-            if strike:
-                strikes.append(strike)
-        self.time = time
+        self.prepare(time)
+        strikes, self._untold = self._untold, []
+        self.time = float(time)
         state, rig = self.state, self._rig
         spring = coupler(rig, state, self.stance_distance)
         return Motion(
-            time, state.theta1 + 2.0 * rig.front.alpha * self.steps[0], state.omega1,
+            self.time, state.theta1 + 2.0 * rig.front.alpha * self.steps[0], state.omega1,
             state.theta2 + 2.0 * rig.rear.alpha * self.steps[1], state.omega2, spring.length, spring.rate,
             coupler_force(rig, spring.length, spring.rate) + self._force, tuple(strikes))
+
+    def prepare(self, time: float) -> None:
+        """Do now the costly part of the way to a time [s], for which `advance_to` is about to ask: the new series.
+
+        What changes meanwhile, the rig or the force, holds from the last event on that way.
+        """
+        while self._look_ahead().end <= time:
+            _, strike = self.step()
+            if strike:
+                self._untold.append(strike)
 
     def _look_ahead(self) -> _Ahead:
         """Expand the motion from here and find where that ends, unless it is known."""
         if self._ahead:
             return self._ahead
+        self._require_length()
         for i in (0, 1):
             if self.standing[i]:
                 self._rest(i)
-        self._require_length()
         w = self._work
         taylor.expand(w, 1)
         h = self._turn_once(min(taylor.step_size(w, 0, TOLERANCE), LONGEST_STEP * self._unit))
@@ -267,7 +275,7 @@ class Simulation:
         return self._ahead
 
     def _turn_once(self, h: float) -> float:
-        """Shorten a step in which a wheel turns back and forth: on the way it may touch its guard and leave it again."""
+        """Shorten a step in which a wheel turns back and forth: it may touch its guard between, and leave it again."""
         for omega in _OMEGA:
             speeds = [taylor.evaluate(self._work, omega, 0, part * h) for part in (0.0, 0.25, 0.5, 0.75, 1.0)]
             turns = [j for j in range(1, 5) if speeds[j - 1] * speeds[j] < 0.0]

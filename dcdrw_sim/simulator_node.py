@@ -2,6 +2,7 @@
 
 import math
 import sys
+from contextlib import suppress
 from typing import Any
 
 from rclpy.node import Node
@@ -18,6 +19,8 @@ from dcdrw_sim.simulator import SimulatedRig, SimulatorParams, Timeline
 
 SHORTEST_TICK = 0.0005
 """Samples that are due more often are published in bursts [s]."""
+PREPARE_WITHIN = 0.02
+"""A sample that is due so soon is prepared at once, so that it is on time [s]."""
 BURST = 200
 """Samples per callback at most, so that services and parameters are served however far behind the pace is."""
 CLOCK_RATE = 100.0
@@ -87,6 +90,9 @@ class SimulatorNode(Node):
             if self._timeline.due > reached:
                 break
             self._publish()
+        if not self._paused and self._period() <= PREPARE_WITHIN:
+            with suppress(MotionError):  # told when the sample is due
+                self._rig.simulation.prepare(self._timeline.rig_time)
 
     def _publish(self) -> None:
         timeline = self._timeline

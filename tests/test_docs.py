@@ -21,6 +21,7 @@ def test_a_table_without_a_place_is_told():
 
 
 def test_example_rig_is_the_default_rig():
-    read, default = read_parameter_file(ROOT / 'config' / 'rig.yaml').rig.resolved(), TrialParams().rig.resolved()
+    default = TrialParams().rig.resolved()
+    read = read_parameter_file(ROOT / 'config' / 'rig.yaml', TrialParams()).rig.resolved()
     assert read._replace(slope=0.0) == default._replace(slope=0.0)
     assert read.slope == pytest.approx(default.slope, abs=1e-4)

@@ -7,6 +7,7 @@ import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,8 @@ class Bench:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.domain = free_domain()
+        self._stack = ExitStack()
+        self.domain = self._stack.enter_context(free_domain())
         self.heard: dict[str, list[Any]] = defaultdict(list)
         self.processes: list[subprocess.Popen[bytes]] = []
         os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
@@ -47,6 +49,7 @@ class Bench:
         self.executor.shutdown()
         self.node.destroy_node()
         self.context.try_shutdown()
+        self._stack.close()
 
     def start(self, name: str, *arguments: str, **parameters: Any) -> subprocess.Popen[bytes]:
         """Start a node with parameters; double underscores stand for dots."""

@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from rigs import ALPHA, GENTLE, UNCOUPLED, UNEQUAL, between, rigs, rolling, starts
 
-from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_sim import trajectory
 from dcdrw_sim.dynamics import State, limit_cycle_speed
 from dcdrw_sim.ensemble import run_ensemble
@@ -116,6 +116,15 @@ def test_any_number_of_pairs_runs(count):
     ensemble = run_ensemble(SWEEP, states[:count], 5.0, 30, **{name: value[:count] for name, value in columns.items()})
     assert len(ensemble.counts) == count
     assert (ensemble.counts > 0).all()
+
+
+def test_two_wheels_that_strike_at_one_instant_both_strike():
+    wheel = WheelParams(1.0, 5.0, 9.0)
+    rig, state = RigParams(wheel, wheel, k=0.0, b=0.0, slope=0.0625), State(0.0, 1.0, 0.0, 1.0)
+    both = strikes(run_ensemble(rig, [state], 3.0, 40), 0)
+    run = trajectory.run(rig, state, 3.0)
+    assert both['t'][::2] == pytest.approx(both['t'][1::2], abs=1e-12)
+    assert [strike.t for strike in run.strikes] == pytest.approx(both['t'], abs=1e-9)
 
 
 # Ends

@@ -399,6 +399,11 @@ def test_hubs_in_one_place_are_refused():
         Simulation(PAPER._replace(S0=0.0), State(0.1, 1.0, 0.1, 1.0))
 
 
+def test_hubs_in_one_place_are_refused_where_the_wheels_stand_too():
+    with pytest.raises(HubsMetError, match='the hubs met'):
+        Simulation(PAPER._replace(S0=0.0), BOTH_AT_REST)
+
+
 @pytest.mark.parametrize('rig', [UNCOUPLED, PAPER._replace(k=5.0, b=0.0), PAPER._replace(b=1.0)])
 def test_hubs_that_meet_end_the_motion_each_time_one_asks(rig):
     # On one foothold (S = 0), the rear wheel the faster: it catches up.
@@ -461,3 +466,10 @@ def test_on_its_limit_cycle_a_pair_without_coupler_strikes_evenly():
         assert np.ptp(np.diff([strike.t for strike in mine])) < 1e-11
         before = limit_cycle_speed(UNCOUPLED.front, UNCOUPLED.slope, UNCOUPLED.gravity, ALPHA)
         assert [getattr(strike.state, name) for strike in mine] == pytest.approx([before] * len(mine), rel=1e-12)
+
+
+def test_prepared_way_is_the_same_way():
+    plain, prepared = (Simulation(PAPER, START) for _ in range(2))
+    for k in range(1, 400):
+        prepared.prepare(k / 100)
+        assert prepared.advance_to(k / 100) == plain.advance_to(k / 100)

@@ -134,9 +134,9 @@ def test_a_leg_that_only_dips_into_its_guard_within_a_step_strikes():
     # A stiff spring shakes a light wheel: within 0.03 s it leaves its guard, comes back to it and leaves it again.
     rig = RigParams(WheelParams(0.96, 14.0, 5.0), WheelParams(1.58, 6.4, 40.0), k=1318.0, b=0.0, D0=1.484, S0=-0.59,
                     slope=0.2686)
-    simulation = Simulation(rig, State(-rig.front.alpha, 0.014, -0.0028, 0.32))
-    simulation.external_force = 97.9
-    expected = solve_ivp(lambda t, y: paper_rates(rig, -0.59, y, 97.9), (0.0, 0.03), simulation.state, 'DOP853',
+    simulation = Simulation(rig, State(-rig.front.alpha, 0.009, -0.011, 0.957))
+    simulation.external_force = 140.0
+    expected = solve_ivp(lambda t, y: paper_rates(rig, -0.59, y, 140.0), (0.0, 0.03), simulation.state, 'DOP853',
                          events=lambda t, y: y[0] + rig.front.alpha, rtol=1e-12, atol=1e-14, max_step=1e-4)
     touches = [t for t in expected.t_events[0] if t > 1e-6]
     strike = simulation.advance_to(0.03).strikes[0]
