@@ -1,5 +1,6 @@
 """What every node does alike: declare parameters, advertise, listen, report, spin, and end cleanly."""
 
+import gc
 import math
 import signal
 import sys
@@ -163,6 +164,7 @@ def run(name: str, make_node: Callable[[], Node], args: list[str] | None = None)
         return 2
     executor = make_executor()
     executor.add_node(node)
+    gc.freeze()  # what exists now stays: collections that come need not look at it
     with suppress(ExternalShutdownException):
         while not stopped.is_set() and rclpy.ok():
             executor.spin_once(timeout_sec=SPIN_SECONDS)

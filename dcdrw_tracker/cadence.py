@@ -1,10 +1,10 @@
 """Cadence: the period of a stream, learned from its stamps, and the gaps in it."""
 
-from collections import deque
+import math
 from typing import NamedTuple
 
-MEMORY = 15
-"""Intervals whose median is the period."""
+LOOKS = (2, 5, 15)
+"""After so many intervals their median becomes the period; after the last, anew."""
 GAP = 1.5
 """An interval longer than this many periods is a gap."""
 
@@ -29,7 +29,8 @@ class Cadence:
         self.lost = 0
         self._last_ns: int | None = None
         self._longest_ns = 0
-        self._intervals: deque[int] = deque(maxlen=MEMORY)
+        self._period_ns = 0
+        self._intervals: list[int] = []
 
     def tick(self, stamp_ns: int) -> None:
         """Take the next stamp; one that does not move on is ignored."""
@@ -41,12 +42,16 @@ class Cadence:
         if interval <= 0:
             return
         self._last_ns = stamp_ns
-        period = self._period_ns()
-        if len(self._intervals) > 1 and interval > GAP * period:
+        period = self._period_ns
+        if period and interval > GAP * period:
             self.gaps += 1
             self.lost += round(interval / period) - 1
             self._longest_ns = max(self._longest_ns, interval)
         self._intervals.append(interval)
+        if len(self._intervals) in LOOKS:
+            self._period_ns = sorted(self._intervals)[(len(self._intervals) - 1) // 2]
+            if len(self._intervals) == LOOKS[-1]:
+                self._intervals.clear()
 
     def jump(self, stamp_ns: int) -> None:
         """Go on from another stamp, without a gap: the source has started anew."""
@@ -54,9 +59,5 @@ class Cadence:
 
     def status(self) -> CadenceStatus:
         """A snapshot."""
-        rate = 1e9 / self._period_ns() if self._intervals else float('nan')
+        rate = 1e9 / self._period_ns if self._period_ns else math.nan
         return CadenceStatus(rate, self.gaps, self.lost, self._longest_ns * 1e-9)
-
-    def _period_ns(self) -> int:
-        ordered = sorted(self._intervals)
-        return ordered[(len(ordered) - 1) // 2] if ordered else 0
