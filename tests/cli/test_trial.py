@@ -40,6 +40,12 @@ def wait_for_motion(tmp_path: Path, process: subprocess.Popen[str]) -> None:
         time.sleep(0.05)
 
 
+def find(process: subprocess.Popen[str], module: str) -> list[int]:
+    """The children of a trial that run a module."""
+    children = Path(f'/proc/{process.pid}/task/{process.pid}/children').read_text().split()
+    return [int(child) for child in children if module in Path(f'/proc/{child}/cmdline').read_text()]
+
+
 def summary(tmp_path: Path) -> dict:
     return json.loads((tmp_path / 'out' / 'summary.json').read_text())
 
@@ -81,14 +87,24 @@ def test_interrupt_keeps_what_there_is(tmp_path):
 def test_dead_node_ends_the_trial_with_the_reason(tmp_path):
     process = start(tmp_path, '--seconds', '600')
     wait_for_motion(tmp_path, process)
-    nodes = subprocess.run(['pgrep', '-P', str(process.pid), '-f', 'phase_estimator_node'], capture_output=True,
-                           text=True, check=True).stdout.split()
-    os.kill(int(nodes[0]), signal.SIGKILL)
+    (node,) = find(process, 'phase_estimator_node')
+    os.kill(node, signal.SIGKILL)
     _, errors = process.communicate(timeout=40)
     assert process.returncode == 1
     assert 'phase_estimator was killed by SIGKILL' in errors
     assert summary(tmp_path)['end'].startswith('phase_estimator was killed')
     assert (tmp_path / 'out' / 'samples.csv').stat().st_size > 2000
+
+
+def test_silence_ends_the_trial_with_the_reason(tmp_path):
+    process = start(tmp_path, '--seconds', '600')
+    wait_for_motion(tmp_path, process)
+    (node,) = find(process, 'simulator_node')
+    os.kill(node, signal.SIGSTOP)
+    _, errors = process.communicate(timeout=40)
+    assert process.returncode == 1
+    assert 'no data for 3 s' in errors
+    assert summary(tmp_path)['duration_s'] > 0
 
 
 def test_stalled_rig_is_said_to_stall(tmp_path):

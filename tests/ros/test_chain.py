@@ -1,6 +1,7 @@
 """The whole chain in three processes."""
 
 import signal
+from itertools import pairwise
 
 from bench import Bench
 from std_srvs.srv import SetBool
@@ -82,3 +83,16 @@ def test_killed_simulator_is_stale_and_a_new_one_is_judged_afresh(bench):
         bench.spin(0.3)
     bench.wait(lambda: verdicts[-1].data, 'synchronized again')
     assert abs(errors[-1].data) < 8.0
+
+
+def test_chain_follows_simulated_time_at_another_pace(bench):
+    phases, verdicts = bench.hear(PHASE_STATE), bench.hear(SYNCHRONIZED)
+    for name in ('sync_monitor', 'phase_estimator'):
+        bench.start(name, use_sim_time=True)
+    bench.wait(lambda: bench.node.count_subscribers('phase_state') >= 2, 'the monitor')
+    bench.start('simulator', publish_clock=True, real_time_factor=4, **STIFF)
+    bench.wait(lambda: verdicts and verdicts[-1].data, 'synchronized')
+    read = PhaseSampleReader()
+    stamps = [read.read(phase).stamp_ns for phase in phases]
+    assert stamps[0] < 5 * 10**9  # simulated time, from its start
+    assert {b - a for a, b in pairwise(stamps)} == {5_000_000}
