@@ -10,7 +10,7 @@ from dcdrw_msgs_py.quantity import check
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim import strikes, taylor
 from dcdrw_sim.compiled import compiled
-from dcdrw_sim.simulation import LEAVING_SPEED, LONGEST_STEP, SHORTEST_STEP, MotionError, work_parameters
+from dcdrw_sim.simulation import LEAVING_SPEED, LONGEST_STEP, SHORTEST_STEP, MotionError, accept, work_parameters
 from dcdrw_sim.strikes import BACKWARD, FORWARD, NONE, End, first_strike, reset
 from dcdrw_sim.taylor import LANES, OMEGA1, OMEGA2, THETA1, THETA2, bare, expand, minimum, motion, rows, step_size
 
@@ -108,7 +108,7 @@ def _parameters(rig: RigParams, count: int, columns: dict[str, ArrayLike]) -> Fl
     values['D0'] = np.where(np.isnan(values['D0']), at_rest, values['D0'])
     for extreme in (np.min, np.max) if count else ():
         limits: dict[str, Any] = {name: float(extreme(value)) for name, value in values.items()}
-        rig = check(rig._replace(**limits))
+        rig = accept(rig._replace(**limits))
     lane = [0.0] * SIZE
     work_parameters(lane, 0, rig)
     parameters = np.tile(lane[taylor.G1:taylor.END:LANES], (count, 1))

@@ -122,7 +122,7 @@ class Simulation:
     """
 
     def __init__(self, rig: RigParams, state: State) -> None:
-        self._rig = _accept(rig)
+        self._rig = accept(rig)
         self._wheels: tuple[WheelParams, WheelParams] = (self._rig.front, self._rig.rear)
         for name, value in zip(State._fields, state, strict=True):
             if not math.isfinite(value):
@@ -158,7 +158,7 @@ class Simulation:
 
     @rig.setter
     def rig(self, rig: RigParams) -> None:
-        rig = _accept(rig._replace(front=self._rig.front, rear=self._rig.rear, S0=self._rig.S0))
+        rig = accept(rig._replace(front=self._rig.front, rear=self._rig.rear, S0=self._rig.S0))
         if rig != self._rig:
             self._start_anew()
             self._rig = rig
@@ -362,7 +362,7 @@ class Simulation:
             self._work[_FREE[i]] = 0.0 if self.standing[i] else 1.0
 
 
-def _accept(rig: RigParams) -> RigParams:
+def accept(rig: RigParams) -> RigParams:
     """The rig with its derived defaults.
 
     Raises:

@@ -224,14 +224,14 @@ class SyncMonitor:
         self._usual = max(min(low, n), n - 1), min(max(high, n), n + 1)
 
     def _take_error(self, last: PhaseSample, phase: PhaseSample, strikes: int) -> None:
-        """Enter the band at ±band, leave it at ±(band + hysteresis), and latch after `hold_steps` strikes inside."""
+        """Latch after `hold_steps` strikes within ±band; unlatch beyond ±(band + hysteresis)."""
         params = self.params
         self._error = error = self._percent(phase.phi.angle)
         self._swing = min(self._swing[0], error), max(self._swing[1], error)
         self._smooth = self._smoothed(last, phase)
         first = self._steps + 1
         self._steps += strikes
-        edge = params.band_percent if self._entered is None else params.band_percent + params.band_hysteresis_percent
+        edge = params.band_percent + (params.band_hysteresis_percent if self._synchronized else 0.0)
         if abs(self._smooth) <= edge and not self._stalled(phase.stamp_ns):
             if self._entered is None:
                 self._entered = first
