@@ -209,8 +209,8 @@ def compare(rates: list[float], seconds: float) -> None:
     """Measure both chains at each rate, and print the table."""
     print(f'{"chain":18} {"p50 µs":>9} {"p99 µs":>9} {"CPU % of a core":>20} {"in all":>7} {"sent":>8} {"lost":>6}')
     for rate in rates:
-        suite = [[sys.executable, '-m', module, '--ros-args', '-p', f'rate:={rate}', '-p', 'slope:=0.05']
-                 for module in SUITE]
+        arguments = ['--ros-args', '--log-level', 'warn', '-p', f'rate:={rate}', '-p', 'slope:=0.05']
+        suite = [[sys.executable, '-m', module, *arguments] for module in SUITE]
         bare = [[sys.executable, __file__, '--bare', role, '--rates', str(rate)] for role in ROLES]
         results = [measure(suite, suite_errors, seconds), measure(bare, bare_errors, seconds)]
         for name, result in zip(('suite', 'bare'), results, strict=True):

@@ -71,8 +71,9 @@ def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp('pip')
     source = folder / 'source'
     shutil.copytree(ROOT, source, ignore=shutil.ignore_patterns('.venv*', '.git', 'build', '*.egg-info', 'trials'))
-    subprocess.run([sys.executable, '-m', 'pip', 'install', '--quiet', '--no-deps', '--no-build-isolation',
-                    '--prefix', folder / 'prefix', source], check=True, capture_output=True)
+    # --ignore-installed: pip would take away the copy that this environment works with.
+    subprocess.run([sys.executable, '-m', 'pip', 'install', '--quiet', '--ignore-installed', '--no-deps',
+                    '--no-build-isolation', '--prefix', folder / 'prefix', source], check=True, capture_output=True)
     return folder / 'prefix'
 
 
