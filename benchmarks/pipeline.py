@@ -1,8 +1,9 @@
 """The pipeline's cost beside that of bare rclpy nodes: latency, CPU and losses of three processes.
 
-    python benchmarks/pipeline.py [--rates 100 1000] [--seconds 10]
+    python benchmarks/pipeline.py [--rates 100 1000] [--rounds 3] [--seconds 5]
 
-Two chains of three processes are measured in turn at each rate, on a domain of their own:
+Two chains of three processes are measured at each rate in turn, round by round, on a domain of their own; the table
+holds each figure's median over the rounds, and all losses:
 
 - suite: simulator → phase_estimator → sync_monitor;
 - bare: three nodes that only copy a float, with the same messages, as many of them, the same QoS and executor.
@@ -183,16 +184,23 @@ def spin(executor: Any, seconds: float) -> None:
         executor.spin_once(timeout_sec=min(left, 0.1))
 
 
-def row(name: str, result: Result) -> str:
-    p50, p99 = np.percentile(result.latencies, (50, 99))
-    cpu = ' + '.join(f'{value:4.1f}' for value in result.cpu)
-    return f'{name:18} {p50:9.0f} {p99:9.0f} {cpu:>20} {sum(result.cpu):7.1f} {result.sent:8d} {result.lost:6d}'
+def figures(results: list[Result]) -> Any:
+    """Medians over the rounds: p50, p99 [µs], and each process's CPU [%]."""
+    return np.median([[*np.percentile(result.latencies, (50, 99)), *result.cpu] for result in results], axis=0)
+
+
+def row(name: str, results: list[Result]) -> str:
+    p50, p99, *cpu = figures(results)
+    each = ' + '.join(f'{value:4.1f}' for value in cpu)
+    sent, lost = (sum(counts) for counts in zip(*((r.sent, r.lost) for r in results), strict=True))
+    return f'{name:18} {p50:9.0f} {p99:9.0f} {each:>20} {sum(cpu):7.1f} {sent:8d} {lost:6d}'
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--rates', type=float, nargs='+', default=[100.0, 1000.0], metavar='HZ')
-    parser.add_argument('--seconds', type=float, default=10.0, help='measured time of each chain')
+    parser.add_argument('--rounds', type=int, default=3, help='how often each chain is measured')
+    parser.add_argument('--seconds', type=float, default=5.0, help='measured time of each chain in each round')
     parser.add_argument('--bare', choices=ROLES, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.bare:
@@ -200,24 +208,25 @@ def main() -> int:
     with free_domain() as domain:
         os.environ.update(ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST')
         rclpy.init()
-        compare(options.rates, options.seconds)
+        compare(options.rates, options.rounds, options.seconds)
         rclpy.shutdown()
     return 0
 
 
-def compare(rates: list[float], seconds: float) -> None:
+def compare(rates: list[float], rounds: int, seconds: float) -> None:
     """Measure both chains at each rate, and print the table."""
     print(f'{"chain":18} {"p50 µs":>9} {"p99 µs":>9} {"CPU % of a core":>20} {"in all":>7} {"sent":>8} {"lost":>6}')
     for rate in rates:
         arguments = ['--ros-args', '--log-level', 'warn', '-p', f'rate:={rate}', '-p', 'slope:=0.05']
         suite = [[sys.executable, '-m', module, *arguments] for module in SUITE]
         bare = [[sys.executable, __file__, '--bare', role, '--rates', str(rate)] for role in ROLES]
-        results = [measure(suite, suite_errors, seconds), measure(bare, bare_errors, seconds)]
-        for name, result in zip(('suite', 'bare'), results, strict=True):
-            print(row(f'{name} {rate:g} Hz', result), flush=True)
-        ours, theirs = results
-        p50, p99 = (np.percentile(ours.latencies, q) / np.percentile(theirs.latencies, q) for q in (50, 99))
-        print(f'{"  ratio":18} {p50:9.2f} {p99:9.2f} {"":20} {sum(ours.cpu) / sum(theirs.cpu):7.2f}', flush=True)
+        results = [(measure(suite, suite_errors, seconds), measure(bare, bare_errors, seconds)) for _ in range(rounds)]
+        ours, theirs = ([pair[i] for pair in results] for i in (0, 1))
+        print(row(f'suite {rate:g} Hz', ours), row(f'bare {rate:g} Hz', theirs), sep='\n', flush=True)
+        p50, p99, *cpu = figures(ours) / figures(theirs)
+        whole = figures(ours)[2:].sum() / figures(theirs)[2:].sum()
+        each = ' + '.join(f'{ratio:4.2f}' for ratio in cpu)
+        print(f'{"  ratio":18} {p50:9.2f} {p99:9.2f} {each:>20} {whole:7.2f}', flush=True)
 
 
 if __name__ == '__main__':
