@@ -4,6 +4,7 @@ import argparse
 import sys
 from importlib.metadata import PackageNotFoundError, version
 
+from dcdrw import map as return_map
 from dcdrw import simulate, trial
 
 _DESCRIPTION = 'Two rimless wheels on a slope, joined by a spring and a damper: simulate them, run and judge trials.'
@@ -11,6 +12,7 @@ _EPILOG = """\
 examples:
   dcdrw trial                             the paper's trial, half a minute, with summary and picture
   dcdrw trial --rig my_rig.yaml --initial-phase 35 --seconds 20
+  dcdrw map --rig my_rig.yaml             how fast the pair falls into step: multipliers of the return map
   dcdrw simulate case.json --strikes strikes.json --trajectory motion.csv --rate 200
 
 nodes (each also by `ros2 run dcdrw NAME`): simulator, phase_estimator, sync_monitor
@@ -23,7 +25,7 @@ def main(arguments: list[str] | None = None) -> int:
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--version', action='version', version=f'dcdrw {_version()}')
     commands = parser.add_subparsers(title='commands', metavar='COMMAND', required=True)
-    for module in (trial, simulate):
+    for module in (trial, simulate, return_map):
         module.add_command(commands)
     options = parser.parse_args(arguments)
     try:

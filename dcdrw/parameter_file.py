@@ -1,5 +1,6 @@
 """Rig files: ROS 2 parameter files, so that one file serves the command line and every node."""
 
+import argparse
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -9,6 +10,7 @@ import yaml
 from dcdrw.executables import EXECUTABLES
 from dcdrw_msgs_py.quantity import build, fields, flatten
 from dcdrw_msgs_py.rig import RigParams, WheelPitch, WheelShape
+from dcdrw_sim.presets import PRESETS
 from dcdrw_sim.simulator import SimulatorParams
 from dcdrw_tracker.phase import PhaseParams
 from dcdrw_tracker.sync import SyncParams
@@ -62,6 +64,26 @@ def read_parameter_file(path: Path, base: TrialParams) -> TrialParams:
         chosen = {key: value for key, value in values.items() if key in mine or key not in known}
         sets[name] = build(kind, flatten(getattr(base, name)) | chosen, str(path))
     return TrialParams(**sets)
+
+
+def add_rig_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that choose a rig."""
+    presets = '; '.join(f'{name}, {preset.doc}' for name, preset in PRESETS.items())
+    parser.add_argument('--preset', choices=PRESETS, default='paper', metavar='NAME',
+                        help=f'the rig: {presets} (default: %(default)s)')
+    parser.add_argument('--rig', type=Path, metavar='FILE.yaml',
+                        help='parameters that differ from the preset: a ROS 2 parameter file, as config/rig.yaml')
+
+
+def chosen_params(options: argparse.Namespace) -> TrialParams:
+    """The parameters that these options choose.
+
+    Raises:
+        ValueError, OSError: as `read_parameter_file`.
+
+    """
+    params = TrialParams.of_rig(PRESETS[options.preset].rig)
+    return read_parameter_file(options.rig, params) if options.rig else params
 
 
 def write_parameter_file(params: TrialParams, path: Path) -> None:

@@ -14,11 +14,10 @@ from typing import Any
 
 from dcdrw.arguments import number, positive
 from dcdrw.figure import draw_trial
-from dcdrw.parameter_file import TrialParams, read_parameter_file, write_parameter_file
+from dcdrw.parameter_file import TrialParams, add_rig_options, chosen_params, write_parameter_file
 from dcdrw.processes import NodeProcess, free_domain
 from dcdrw.summary import SECOND, TrialData, judge, summarize
 from dcdrw_msgs_py.quantity import check
-from dcdrw_sim.presets import PRESETS
 from dcdrw_tracker.diagnostics import phase_text
 from dcdrw_tracker.sync import SyncMonitor
 
@@ -44,11 +43,7 @@ def add_command(commands: Any) -> None:
         'trial', help='run a trial in simulation, live, and judge it', epilog=_EPILOG,
         description='Run simulator, phase estimator and synchronization monitor as processes over DDS.',
         formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--preset', choices=PRESETS, default='paper', metavar='NAME',
-                        help=f'the rig: {"; ".join(f"{name}, {preset.doc}" for name, preset in PRESETS.items())} '
-                        '(default: %(default)s)')
-    parser.add_argument('--rig', type=Path, metavar='FILE.yaml',
-                        help='parameters that differ from the preset: a ROS 2 parameter file, as config/rig.yaml')
+    add_rig_options(parser)
     parser.add_argument('--initial-phase', type=number, metavar='PERCENT',
                         help='phase at the start, percent of a step (default: 21.6)')
     parser.add_argument('--seconds', type=positive, default=30.0, help='length of the trial (default: %(default)g)')
@@ -66,9 +61,7 @@ def trial(options: argparse.Namespace) -> int:
     except ImportError:
         raise ValueError("a trial needs rclpy: source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' "
                          'ros-jazzy-common-interfaces') from None
-    params = TrialParams.of_rig(PRESETS[options.preset].rig)
-    if options.rig:
-        params = read_parameter_file(options.rig, params)
+    params = chosen_params(options)
     if options.initial_phase is not None:
         params = params._replace(simulator=check(
             params.simulator._replace(initial_phase_percent=options.initial_phase), '--initial-phase'))
