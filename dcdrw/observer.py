@@ -2,6 +2,7 @@
 
 import csv
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +30,11 @@ class Observer(Node):
         self.errors = 0
         """Messages of the monitor: the whole chain works when the first has come."""
         self.synchronized = False
+        """The monitor's verdict."""
         self.failure = ''
         self._recording = self._moving = False
-        self.diagnoses: dict[str, tuple[int, str]] = {}
+        self.diagnoses: dict[str, str] = {}
+        """What each node said of itself last."""
         self.age = Age()
         self._joints_reader, self._phase_reader = JointSampleReader(), PhaseSampleReader()
         self._files = [(folder / name).open('w', encoding='utf-8', newline='')
@@ -42,7 +45,7 @@ class Observer(Node):
         for topic, callback in ((JOINT_STATES, self._on_joints), (PHASE_STATE, self._on_phase),
                                 (SYNC_ERROR, self._on_error), (SYNCHRONIZED, self._on_synchronized),
                                 (FOOTFALLS, self._on_footfall), (DIAGNOSTICS, self._on_diagnostics)):
-            listen(self, topic, callback)
+            listen(self, topic, _bearing(callback))
 
     def record(self) -> None:
         """Begin with the last sample before the wheels move, which are now let go."""
@@ -97,4 +100,12 @@ class Observer(Node):
 
     def _on_diagnostics(self, message: Any) -> None:
         for status in message.status:
-            self.diagnoses[status.name] = status.level[0], status.message
+            self.diagnoses[status.name] = status.message
+
+
+def _bearing(callback: Callable[[Any], None]) -> Callable[[Any], None]:
+    """A callback that passes over what it cannot read: on a shared domain others may publish, too."""
+    def bear(message: Any) -> None:
+        with suppress(ValueError):
+            callback(message)
+    return bear

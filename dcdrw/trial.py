@@ -167,7 +167,7 @@ class _Trial:
 
     def _show(self, monitor: SyncMonitor) -> None:
         status, falls = monitor.status(), self.observer.footfalls
-        state = 'SYNCHRONIZED' if status.synchronized else 'STALLED' if status.stalled else 'CONVERGING'
+        state = 'SYNCHRONIZED' if self.observer.synchronized else 'STALLED' if status.stalled else 'CONVERGING'
         front = sum(fall.wheel == 'front' for fall in falls)
         self._say(f'{self._elapsed():5.1f} s  phase {phase_text(status.phase)}  error {status.error_percent:+5.1f} %  '
                   f'n {status.step_difference:+d}  strikes {front} + {len(falls) - front}  {state}')
@@ -213,7 +213,8 @@ class _Trial:
         summary = summarize(data, status, errors)
         end = failure or ('interrupted' if self.interrupted else 'complete')
         (self.folder / 'summary.json').write_text(
-            json.dumps({'end': end, **summary}, indent=1, ensure_ascii=False) + '\n', encoding='utf-8')
+            json.dumps({'end': end, **summary, 'diagnostics': observer.diagnoses}, indent=1, ensure_ascii=False) + '\n',
+            encoding='utf-8')
         if data.phases:
             try:
                 draw_trial(data, status, summary['sentence'], self.folder / 'trial.png')

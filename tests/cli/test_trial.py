@@ -61,6 +61,8 @@ def test_trial_ends_with_summary_picture_and_sentence(tmp_path):
     assert result['duration_s'] == pytest.approx(6.0, abs=0.05)
     assert result['samples']['lost'] == 0
     assert 0 < result['steps_to_synchronization'] < 8
+    # The monitor of the trial and the one that judges its record are one.
+    assert result['diagnostics']['sync_monitor'] == f'synchronized after {result["steps_to_synchronization"]} steps'
     assert result['parameters']['rig']['k'] == 60.0
     low, high = result['final_band_percent']
     assert -7.0 < low < high < 7.0
