@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from dcdrw.arguments import number, positive
+from dcdrw.executables import EXECUTABLES
 from dcdrw.figure import draw_trial
 from dcdrw.parameter_file import TrialParams, add_rig_options, chosen_params, write_parameter_file
 from dcdrw.processes import NodeProcess, free_domain
@@ -125,11 +126,9 @@ class _Trial:
         file = self.folder / 'parameters.yaml'
         held = self.params.simulator._replace(paused=True)
         write_parameter_file(self.params._replace(simulator=held), file)
-        for module in ('dcdrw_tracker.sync_monitor_node', 'dcdrw_tracker.phase_estimator_node',
-                       'dcdrw_sim.simulator_node'):
-            name = module.split('.')[1].removesuffix('_node')
-            self.nodes.append(NodeProcess(name, module, ['--ros-args', '--params-file', str(file)], environment,
-                                          self.folder / f'{name}.log'))
+        for node in reversed(EXECUTABLES):  # who listens, first
+            self.nodes.append(NodeProcess(node.name, node.module, ['--ros-args', '--params-file', str(file)],
+                                          environment, self.folder / f'{node.name}.log'))
         self._say('starting the nodes ...')
         self._spin_until(lambda: self.observer.errors > 0, START_SECONDS,
                          'no data came through the nodes: is another process interfering, or the machine too busy?')
