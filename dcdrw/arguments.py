@@ -32,3 +32,10 @@ def count(text: str) -> int:
     if value < 1:
         raise argparse.ArgumentTypeError(f'must be at least 1, got {text}')
     return value
+
+
+def domain(text: str) -> int:
+    """Parse a ROS domain; above 101 its ports would be those that Linux gives to anybody."""
+    if not text.isdecimal() or int(text) > 101:
+        raise argparse.ArgumentTypeError(f'must be a whole number from 0 to 101, got {text!r}')
+    return int(text)

@@ -27,8 +27,8 @@ class Observer(Node):
         self.joints: list[JointSample] = []
         self.phases: list[PhaseSample] = []
         self.footfalls: list[Footfall] = []
-        self.errors = 0
-        """Messages of the monitor: the whole chain works when the first has come."""
+        self.heard: set[str] = set()
+        """Topics of which a message has come."""
         self.synchronized = False
         """The monitor's verdict."""
         self.failure = ''
@@ -45,11 +45,12 @@ class Observer(Node):
         for topic, callback in ((JOINT_STATES, self._on_joints), (PHASE_STATE, self._on_phase),
                                 (SYNC_ERROR, self._on_error), (SYNCHRONIZED, self._on_synchronized),
                                 (FOOTFALLS, self._on_footfall), (DIAGNOSTICS, self._on_diagnostics)):
-            listen(self, topic, _bearing(callback))
+            listen(self, topic, self._bearing(topic.name, callback))
 
     def record(self) -> None:
         """Begin with the last sample before the wheels move, which are now let go."""
         self._recording = True
+        self.age.renew()
 
     def flush(self) -> None:
         """Bring to the disk what has come so far."""
@@ -60,6 +61,14 @@ class Observer(Node):
         """Close the files."""
         for file in self._files:
             self._to_disk(file.close)
+
+    def _bearing(self, name: str, callback: Callable[[Any], None]) -> Callable[[Any], None]:
+        """A callback that passes over what it cannot read: on a shared domain others may publish, too."""
+        def bear(message: Any) -> None:
+            with suppress(ValueError):
+                callback(message)
+                self.heard.add(name)
+        return bear
 
     def _to_disk(self, write: Callable[[], object]) -> None:
         try:
@@ -87,7 +96,7 @@ class Observer(Node):
         self._to_disk(lambda: self._samples.writerow((stamp_ns, *front, *rear, *phi, difference, restarts)))
 
     def _on_error(self, message: Any) -> None:
-        self.errors += 1
+        """That it comes is all."""
 
     def _on_synchronized(self, message: Any) -> None:
         self.synchronized = message.data
@@ -102,10 +111,3 @@ class Observer(Node):
         for status in message.status:
             self.diagnoses[status.name] = status.message
 
-
-def _bearing(callback: Callable[[Any], None]) -> Callable[[Any], None]:
-    """A callback that passes over what it cannot read: on a shared domain others may publish, too."""
-    def bear(message: Any) -> None:
-        with suppress(ValueError):
-            callback(message)
-    return bear

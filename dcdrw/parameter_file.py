@@ -54,6 +54,11 @@ def read_parameter_file(path: Path, base: TrialParams) -> TrialParams:
     if not isinstance(content, dict) or not all(_is_section(section) for section in content.values()):
         raise ValueError(f'{path} is not a parameter file: it must have the form of config/rig.yaml, '
                          f'"{_EVERY_NODE}:", "{_PARAMETERS}:", then the parameters')
+    sections = {_EVERY_NODE, *_NODE_OF.values(), *(f'/{node}' for node in _NODE_OF.values())}
+    for section in content:
+        if section not in sections:
+            raise ValueError(f'{path} has parameters for {section}, which no trial has; there are '
+                             f'{", ".join((_EVERY_NODE, *dict.fromkeys(_NODE_OF.values())))}')
     kinds = {name: type(values) for name, values in base._asdict().items()}
     known = {field.name for kind in kinds.values() for field in fields(kind)}.union(_OF_ROS)
     sets: dict[str, Any] = {}

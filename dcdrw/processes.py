@@ -1,5 +1,6 @@
 """The nodes of a trial as processes of their own, on a domain of their own."""
 
+import ctypes
 import os
 import random
 import signal
@@ -11,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 _STOP_SECONDS = 5.0
+_PR_SET_PDEATHSIG = 1
 _DOMAINS = range(1, 102)
 """Domains whose ports lie below Linux's ephemeral ones."""
 
@@ -36,6 +38,11 @@ def free_domain() -> Iterator[int]:
     raise OSError('no free ROS domain on this machine; name one with --domain')
 
 
+def _end_with_parent() -> None:
+    """Have Linux end this process when its parent dies, however that comes about (prctl(2))."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
 class NodeProcess:
     """One node: `python -m MODULE`, what it prints kept in a log file."""
 
@@ -46,7 +53,8 @@ class NodeProcess:
             self._process = subprocess.Popen(
                 [sys.executable, '-m', module, *arguments], stdin=subprocess.DEVNULL, stdout=file,
                 stderr=subprocess.STDOUT, env={**os.environ, **environment},
-                start_new_session=True)  # Ctrl-C reaches the trial alone, which then stops its nodes in order
+                start_new_session=True,  # Ctrl-C reaches the trial alone, which then stops its nodes in order
+                preexec_fn=_end_with_parent)
 
     @property
     def failure(self) -> str | None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from dcdrw.arguments import count, positive
-from dcdrw_sim.cases import DEFAULT_STRIKES, read_cases, run_record
+from dcdrw_sim.cases import DEFAULT_STRIKES, Case, read_cases, run_record
 from dcdrw_sim.trajectory import Run, Trajectory, run
 
 _EPILOG = """\
@@ -21,6 +21,10 @@ column `case` (csv) or by a prefix `<case>/` of each array (npz).
 """
 
 
+MOST_SAMPLES = 20_000_000
+"""Samples of a trajectory file, which must fit into memory."""
+
+
 def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
@@ -28,7 +32,8 @@ def add_command(commands: Any) -> None:
         description='Integrate cases to their strikes, which are located to rounding error.',
         formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('cases', type=Path, metavar='CASE.json', help='one case or a list of cases')
-    parser.add_argument('--strikes', type=Path, metavar='OUT.json', help='write the strikes here (default: print them)')
+    parser.add_argument('--strikes', type=Path, metavar='OUT.json',
+                        help='write the strikes here (default: print them, unless a trajectory is asked for)')
     parser.add_argument('--count', type=count, metavar='N',
                         help=f'strikes per case (default: as many as the case lists, else {DEFAULT_STRIKES})')
     parser.add_argument('--trajectory', type=Path, metavar='OUT.csv|OUT.npz', help='write the motion here')
@@ -55,9 +60,18 @@ def simulate(options: argparse.Namespace) -> int:
     elif not options.trajectory:
         print(text)
     if options.trajectory:
-        motions = [(case.name, _sample(result, options.rate)) for case, result in zip(cases, runs, strict=True)]
+        samples = sum(result.duration for result in runs) * options.rate
+        if samples > MOST_SAMPLES:
+            raise ValueError(f'--rate {options.rate:g} makes {samples:.3g} samples; {MOST_SAMPLES:.0e} are the limit')
+        motions = [(name, _sample(result, options.rate)) for name, result in zip(_labels(cases), runs, strict=True)]
         _WRITERS[options.trajectory.suffix](options.trajectory, motions)
     return 0
+
+
+def _labels(cases: list[Case]) -> list[str]:
+    """The cases' names, numbered where one stands twice."""
+    names = [case.name for case in cases]
+    return [f'{name}_{index}' if names.count(name) > 1 else name for index, name in enumerate(names)]
 
 
 def _sample(result: Run, rate: float) -> Trajectory:

@@ -12,14 +12,16 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from dcdrw.arguments import number, positive
+from dcdrw.arguments import domain, number, positive
 from dcdrw.executables import EXECUTABLES
 from dcdrw.figure import draw_trial
 from dcdrw.parameter_file import TrialParams, add_rig_options, chosen_params, write_parameter_file
 from dcdrw.processes import NodeProcess, free_domain
 from dcdrw.summary import SECOND, TrialData, judge, summarize
 from dcdrw_msgs_py.quantity import check
+from dcdrw_msgs_py.topics import FOOTFALLS, JOINT_STATES, PHASE_STATE, SYNC_ERROR
 from dcdrw_tracker.diagnostics import phase_text
+from dcdrw_tracker.phase import PhaseParams
 from dcdrw_tracker.sync import SyncMonitor
 
 START_SECONDS = 30.0
@@ -32,6 +34,9 @@ The nodes run on a free ROS domain that only this machine sees, unless --domain 
 trial.png, samples.csv, footfalls.csv and what each node printed. Exit status: 0 the trial ran to its end (whether
 or not the pair fell into step: see the summary), 1 a node died or no data came, 2 wrong input, 130 interrupted.
 """
+
+
+INTERRUPTED = 'interrupted before the start'
 
 
 class TrialError(Exception):
@@ -50,7 +55,7 @@ def add_command(commands: Any) -> None:
     parser.add_argument('--seconds', type=positive, default=30.0, help='length of the trial (default: %(default)g)')
     parser.add_argument('--out', type=Path, metavar='DIR', help='where to write; must not exist, or be empty '
                         '(default: trials/DATE-TIME)')
-    parser.add_argument('--domain', type=int, metavar='N', help='ROS domain to use instead of a free one')
+    parser.add_argument('--domain', type=domain, metavar='N', help='ROS domain to use instead of a free one')
     parser.add_argument('--quiet', action='store_true', help='no live progress')
     parser.set_defaults(run=trial, prog='dcdrw trial')
 
@@ -66,11 +71,17 @@ def trial(options: argparse.Namespace) -> int:
     if options.initial_phase is not None:
         params = params._replace(simulator=check(
             params.simulator._replace(initial_phase_percent=options.initial_phase), '--initial-phase'))
+    if params.simulator.publish_clock:
+        raise ValueError('a trial runs in real time: publish_clock must be false')
     start, _ = params.simulator.start(params.rig)  # an impossible start is told before anything runs
-    params = params._replace(phase=params.phase._replace(S0=start.S0))
+    # The joints are the simulator's, whatever the rig's own are called.
+    joints = PhaseParams()
+    params = params._replace(phase=params.phase._replace(
+        S0=start.S0 - start.front.step_length, front_joint=joints.front_joint, rear_joint=joints.rear_joint,
+        coupler_joint=joints.coupler_joint))
     folder = _folder(options.out)
-    with nullcontext(options.domain) if options.domain is not None else free_domain() as domain:
-        return _Trial(params, options, folder, domain).run()
+    with nullcontext(options.domain) if options.domain is not None else free_domain() as chosen:
+        return _Trial(params, options, folder, chosen).run()
 
 
 def _folder(chosen: Path | None) -> Path:
@@ -104,7 +115,7 @@ class _Trial:
             self.interrupted = True
 
         with ExitStack() as stack:
-            for number_ in (signal.SIGINT, signal.SIGTERM):
+            for number_ in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
                 stack.callback(signal.signal, number_, signal.signal(number_, interrupt))
             rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
             stack.callback(rclpy.try_shutdown)
@@ -120,7 +131,8 @@ class _Trial:
                 self._watch()
             except TrialError as error:
                 failure = str(error)
-        return self._finish(failure)
+            self._stop_nodes()
+            return self._finish(failure)
 
     def _start_nodes(self, environment: dict[str, str]) -> None:
         file = self.folder / 'parameters.yaml'
@@ -130,8 +142,9 @@ class _Trial:
             self.nodes.append(NodeProcess(node.name, node.module, ['--ros-args', '--params-file', str(file)],
                                           environment, self.folder / f'{node.name}.log'))
         self._say('starting the nodes ...')
-        self._spin_until(lambda: self.observer.errors > 0, START_SECONDS,
-                         'no data came through the nodes: is another process interfering, or the machine too busy?')
+        needed = {topic.name for topic in (JOINT_STATES, PHASE_STATE, SYNC_ERROR)}
+        self._spin_until(lambda: needed <= self.observer.heard and self.observer.count_publishers(FOOTFALLS.name) > 0,
+                         START_SECONDS, 'no data came through the nodes')
 
     def _let_go(self) -> None:
         """Release the wheels, which were held until the whole chain was seen to work."""
@@ -183,9 +196,10 @@ class _Trial:
         end = time.monotonic() + limit
         while not condition():
             if self.interrupted:
-                raise TrialError('interrupted before the start')
+                raise TrialError(INTERRUPTED)
             if time.monotonic() > end:
-                raise TrialError(otherwise)
+                said = '; '.join(f'{name}: {message}' for name, message in self.observer.diagnoses.items())
+                raise TrialError(f'{otherwise} ({said or "the nodes say nothing"})')
             self._spin_once()
 
     def _spin_once(self) -> None:
@@ -211,17 +225,18 @@ class _Trial:
         status, errors = judge(data)
         summary = summarize(data, status, errors)
         end = failure or ('interrupted' if self.interrupted else 'complete')
-        (self.folder / 'summary.json').write_text(
-            json.dumps({'end': end, **summary, 'diagnostics': observer.diagnoses}, indent=1, ensure_ascii=False) + '\n',
-            encoding='utf-8')
-        if data.phases:
-            try:
-                draw_trial(data, status, summary['sentence'], self.folder / 'trial.png')
-            except ValueError as error:
-                print(f'dcdrw trial: no picture: {error}', file=sys.stderr)
+        content = json.dumps({'end': end, **summary, 'diagnostics': observer.diagnoses}, indent=1, ensure_ascii=False)
         print(summary['sentence'])
-        print(f'Written: {self.folder}/')
+        try:
+            (self.folder / 'summary.json').write_text(content + '\n', encoding='utf-8')
+            if data.phases:
+                draw_trial(data, status, summary['sentence'], self.folder / 'trial.png')
+            print(f'Written: {self.folder}/')
+        except ValueError as error:
+            print(f'dcdrw trial: no picture: {error}', file=sys.stderr)
+        except OSError as error:
+            failure = failure or f'{error.strerror}: {self.folder}'
         if failure:
             print(f'dcdrw trial: {failure}', file=sys.stderr)
-        return 1 if failure else 130 if self.interrupted else 0
+        return 130 if self.interrupted else 1 if failure else 0
 

@@ -36,21 +36,24 @@ class Parameters(Generic[Params]):
     """A parameter set declared on a node, and kept current: `value` is always a valid set.
 
     What is not declared `live` is read-only. A live parameter that is set to something impossible is refused
-    with the reason; else `on_change` is told the new set.
+    with the reason, by its bounds or by `validate`, which raises ValueError; else `on_change` is told the new set.
 
     Raises:
         ValueError: an override (YAML or command line) is impossible.
 
     """
 
-    def __init__(self, node: Node, params: type[Params], on_change: Callable[[Params], None] | None = None) -> None:
-        self._params, self._on_change = params, on_change
+    def __init__(self, node: Node, params: type[Params], on_change: Callable[[Params], None] | None = None,
+                 validate: Callable[[Params], object] | None = None) -> None:
+        self._params, self._on_change, self._further = params, on_change, validate
         self._fields = {field.name: field for field in fields(params)}
         values = {
             name: node.declare_parameter(name, field.default, _descriptor(field)).value
             for name, field in self._fields.items()
         }
         self.value = build(params, values, f'parameter of {node.get_name()}')
+        if validate:
+            validate(self.value)
         node.add_on_set_parameters_callback(self._validate)
         node.add_post_set_parameters_callback(self._apply)
 
@@ -62,7 +65,9 @@ class Parameters(Generic[Params]):
 
     def _validate(self, parameters: list[Parameter]) -> Any:
         try:
-            self._changed(parameters)
+            changed = self._changed(parameters)
+            if changed is not None and self._further:
+                self._further(changed)
         except ValueError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)

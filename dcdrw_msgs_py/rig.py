@@ -60,7 +60,8 @@ class WheelParams(NamedTuple):
 
 
 StanceDistance = Annotated[
-    float, Quantity('distance of the stance feet at the start, x1 − x2', 'm', derived='ℓ of the front wheel')]
+    float, Quantity('distance of the stance feet just before a strike of the front wheel, x1 − x2', 'm',
+                    derived='ℓ of the front wheel')]
 
 
 class RigParams(NamedTuple):

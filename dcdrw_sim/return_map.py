@@ -220,7 +220,8 @@ class ReturnMap:
 def spectrum(matrix: Floats) -> Complexes:
     """Eigenvalues, those of largest modulus first."""
     values = np.linalg.eigvals(matrix).astype(complex)
-    return values[np.lexsort((-values.imag, -abs(values)))]
+    ordered: Complexes = values[np.lexsort((-values.imag, -abs(values)))]
+    return ordered
 
 
 def _section_of(result: Run) -> SectionState:

@@ -35,6 +35,17 @@ class SimulatorParams(NamedTuple):
     command_timeout: Annotated[float, Quantity('a coupler_force_command older than this counts as 0', 's', above=0.0,
                                                live=True)] = 0.2
 
+    def check_pace(self) -> None:
+        """Refuse a pace that leaves the clock behind.
+
+        Raises:
+            ValueError: stamps would not keep to the clock that everybody else goes by.
+
+        """
+        if self.real_time_factor != 1.0 and not self.publish_clock:
+            raise ValueError(f'real_time_factor {self.real_time_factor:g} needs publish_clock: true, and '
+                             'use_sim_time: true in the other nodes: their clock must keep the same pace')
+
     def start(self, rig: RigParams) -> tuple[RigParams, State]:
         """The rig and its state at the start: as given, and from the initial phase where not.
 

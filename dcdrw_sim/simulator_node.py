@@ -2,6 +2,7 @@
 
 import math
 import sys
+import time
 from contextlib import suppress
 from typing import Any
 
@@ -14,15 +15,15 @@ from dcdrw_msgs_py.messages import SECOND, JointSampleWriter, to_stamp
 from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.topics import CLOCK, COUPLER_FORCE_COMMAND, JOINT_STATES
-from dcdrw_sim.simulation import MotionError
+from dcdrw_sim.simulation import MotionError, accept
 from dcdrw_sim.simulator import SimulatedRig, SimulatorParams, Timeline
 
 SHORTEST_TICK = 0.0005
 """Samples that are due more often are published in bursts [s]."""
 PREPARE_WITHIN = 0.02
 """A sample that is due so soon is prepared at once, so that it is on time [s]."""
-BURST = 200
-"""Samples per callback at most, so that services and parameters are served however far behind the pace is."""
+BURST_SECONDS = 0.02
+"""Time in one callback at most, so that services and signals are served however far behind the pace is."""
 CLOCK_RATE = 100.0
 """Messages on /clock per simulated second at most [Hz]."""
 CLOCK_START_NS = SECOND
@@ -34,8 +35,8 @@ class SimulatorNode(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('simulator', **kwargs)
-        self._rig_parameters = Parameters(self, RigParams, lambda rig: self._rig.configure(rig))
-        self._settings = Parameters(self, SimulatorParams, self._configure)
+        self._rig_parameters = Parameters(self, RigParams, lambda rig: self._rig.configure(rig), accept)
+        self._settings = Parameters(self, SimulatorParams, self._configure, SimulatorParams.check_pace)
         params = self._settings.value
         self._rig = SimulatedRig(self._rig_parameters.value, params)
         # As its own clock's source it cannot wait for that clock.
@@ -86,9 +87,8 @@ class SimulatorNode(Node):
         if stale and self._rig.simulation.external_force:
             self._rig.simulation.external_force = 0.0
         reached = self._timeline.reached(now)
-        for _ in range(BURST):
-            if self._timeline.due > reached:
-                break
+        end = time.monotonic() + BURST_SECONDS
+        while self._timeline.due <= reached and not self._failure and time.monotonic() < end:
             self._publish()
         if not self._paused and self._period() <= PREPARE_WITHIN:
             with suppress(MotionError):  # told when the sample is due

@@ -69,19 +69,19 @@ class Run(NamedTuple):
             ValueError: a time outside the run.
 
         """
-        times = np.atleast_1d(np.asarray(times, float))
-        if not np.all((times >= 0.0) & (times <= self.duration)):
-            raise ValueError(f'times must lie in [0, {self.duration:g}] s, got {times.min():g} to {times.max():g}')
-        which = np.searchsorted([segment.start for segment in self.segments], times, side='right') - 1
-        motion, steps = np.empty((4, times.size)), np.empty((2, times.size))
+        t: Column = np.atleast_1d(np.asarray(times, float))
+        if not np.all((t >= 0.0) & (t <= self.duration)):
+            raise ValueError(f'times must lie in [0, {self.duration:g}] s, got {t.min():g} to {t.max():g}')
+        which = np.searchsorted([segment.start for segment in self.segments], t, side='right') - 1
+        motion, steps = np.empty((4, t.size)), np.empty((2, t.size))
         for index in np.unique(which):
             inside = which == index
-            motion[:, inside] = self.segments[index].at(times[inside])
+            motion[:, inside] = self.segments[index].at(t[inside])
             steps[:, inside] = np.reshape(self.segments[index].steps, (2, 1))
         state, (steps1, steps2) = State(*motion), steps
         spring = coupler(self.rig, state, stance_distance(self.rig, steps1, steps2))
         return Trajectory(
-            times, *state, state.theta1 + 2 * self.rig.front.alpha * steps1,
+            t, *state, state.theta1 + 2 * self.rig.front.alpha * steps1,
             state.theta2 + 2 * self.rig.rear.alpha * steps2, steps1, steps2, spring.length, spring.rate,
             coupler_force(self.rig, spring.length, spring.rate))
 

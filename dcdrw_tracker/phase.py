@@ -223,8 +223,8 @@ class PhaseEstimator:
 
     def _footfalls(self, front: list[Strike], rear: list[Strike]) -> tuple[Footfall, ...]:
         rig = self.params
-        S0 = rig.front.length if math.isnan(rig.S0) else rig.S0
-        falls = [Footfall(FRONT, stamp_ns, S0 + n1 * rig.front.step_length, n1) for stamp_ns, n1 in front]
+        S0 = rig.front.length if math.isnan(rig.S0) else rig.S0  # before the strike with which a trial starts
+        falls = [Footfall(FRONT, stamp_ns, S0 + (n1 + 1) * rig.front.step_length, n1) for stamp_ns, n1 in front]
         falls += [Footfall(REAR, stamp_ns, n2 * rig.rear.step_length, n2) for stamp_ns, n2 in rear]
         return tuple(sorted(falls, key=lambda fall: fall.stamp_ns))
 

@@ -69,7 +69,17 @@ def test_npz_holds_a_column_for_each_quantity(tmp_path):
         assert np.diff(columns['time']) == pytest.approx(0.02)
 
 
+def test_cases_of_one_name_are_told_apart(tmp_path):
+    case = {key: value for key, value in reference()[0]['case'].items() if key != 'name'}
+    (tmp_path / 'two.json').write_text(json.dumps([case, case | {'k': 50.0}]))
+    out = tmp_path / 'motion.npz'
+    assert main(['simulate', str(tmp_path / 'two.json'), '--trajectory', str(out), '--count', '2']) == 0
+    with np.load(out) as columns:
+        assert {'case_0/theta1', 'case_1/theta1'} <= set(columns.files)
+
+
 @pytest.mark.parametrize(('arguments', 'message'), [
+    (['case.json', '--trajectory', 'motion.csv', '--rate', '1e12'], 'samples; 2e+07 are the limit'),
     (['nowhere.json'], 'nowhere.json'),
     (['broken.json'], 'broken.json is not JSON'),
     (['empty.json'], 'empty.json'),

@@ -109,6 +109,20 @@ def test_silence_ends_the_trial_with_the_reason(tmp_path):
     assert summary(tmp_path)['duration_s'] > 0
 
 
+def test_nodes_end_with_a_trial_that_is_killed(tmp_path):
+    process = start(tmp_path, '--seconds', '600')
+    wait_for_motion(tmp_path, process)
+    nodes = find(process, '_node')
+    assert len(nodes) == 3
+    process.kill()
+    process.communicate()
+    end = time.monotonic() + 10
+    while any(Path(f'/proc/{node}').exists() and 'Z' not in Path(f'/proc/{node}/stat').read_text().split()[2]
+              for node in nodes):
+        assert time.monotonic() < end, 'orphans live on'
+        time.sleep(0.05)
+
+
 def test_stalled_rig_is_said_to_stall(tmp_path):
     (tmp_path / 'out').mkdir()  # empty: may be used
     process = start(tmp_path, '--seconds', '7', rig=f'{STIFF}    omega1: 0.2\n    omega2: 0.2\n')
@@ -124,6 +138,8 @@ def test_stalled_rig_is_said_to_stall(tmp_path):
     (['--rig', 'list.yaml'], 'list.yaml is not a parameter file'),
     (['--rig', 'typo.yaml'], 'sloop is not a parameter (typo.yaml); did you mean slope?'),
     (['--rig', 'gentle.yaml'], 'is too gentle'),
+    (['--rig', 'stranger.yaml'], 'stranger.yaml has parameters for simulater, which no trial has'),
+    (['--rig', 'clock.yaml'], 'a trial runs in real time: publish_clock must be false'),
     (['--initial-phase', '120'], 'initial_phase_percent must be'),
     (['--out', 'full'], 'full exists already, not overwriting'),
 ])
@@ -133,6 +149,8 @@ def test_wrong_input_is_told_in_one_line(tmp_path, monkeypatch, capsys, argument
     Path('list.yaml').write_text('- 1')
     Path('typo.yaml').write_text('/**:\n  ros__parameters:\n    sloop: 0.03\n')
     Path('gentle.yaml').write_text('/**:\n  ros__parameters:\n    slope: 0.001\n')
+    Path('stranger.yaml').write_text('simulater:\n  ros__parameters:\n    k: 3\n')
+    Path('clock.yaml').write_text('/**:\n  ros__parameters:\n    publish_clock: true\n')
     Path('full').mkdir()
     Path('full/summary.json').write_text('{}')
     assert main(['trial', *arguments]) == 2

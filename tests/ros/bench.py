@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections import defaultdict
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -32,7 +31,6 @@ class Bench:
         self.folder = folder
         self._stack = ExitStack()
         self.domain = self._stack.enter_context(free_domain())
-        self.heard: dict[str, list[Any]] = defaultdict(list)
         self.processes: list[subprocess.Popen[bytes]] = []
         os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
         self.context = Context()
@@ -72,9 +70,22 @@ class Bench:
 
     def hear(self, topic: Topic, name: str = '') -> list[Any]:
         """Listen to a topic; the list fills as the bench spins."""
-        messages = self.heard[name or topic.name]
-        listen(self.node, topic._replace(name=name or topic.name), messages.append)
+        name = name or topic.name
+        messages: list[Any] = []
+        listen(self.node, topic._replace(name=name), messages.append)
         return messages
+
+    def wake(self, publisher: Any, message: Callable[[int], Any], *answers: list[Any]) -> None:
+        """Send messages with growing stamps until each answer has come, so that the way is open; then forget them."""
+        def answered() -> bool:
+            publisher.publish(message(self.node.get_clock().now().nanoseconds))
+            self.spin(0.02)
+            return all(answers)
+
+        self.wait(answered, 'an answer')
+        self.spin(0.1)  # what is still under way
+        for answer in answers:
+            answer.clear()
 
     def publisher(self, topic: Topic, readers: int = 1) -> Any:
         """Advertise a topic, and wait until a node listens."""

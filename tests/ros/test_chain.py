@@ -34,11 +34,12 @@ def let_go(bench: Bench) -> None:
 def test_estimate_is_the_truth_of_the_simulation(bench):
     phases, falls, errors = bench.hear(PHASE_STATE), bench.hear(FOOTFALLS), bench.hear(SYNC_ERROR_PERCENT)
     start_chain(bench)
-    bench.wait(lambda: errors, 'an error at the end of the chain')
+    bench.wait(lambda: errors and phases and bench.node.count_publishers(FOOTFALLS.name), 'the whole chain')
     let_go(bench)
     bench.wait(lambda: len(falls) >= 16, 'sixteen strikes')
     settings = SimulatorParams(initial_phase_percent=STIFF['initial_phase_percent'])
-    model = run(*settings.start(RigParams(k=STIFF['k'])), strikes=16)
+    start_rig, start_state = settings.start(RigParams(k=STIFF['k']))
+    model = run(start_rig, start_state, strikes=16)
     read = PhaseSampleReader()
     moving = [sample for sample in map(read.read, phases) if sample.front.rate]
     start = moving[0].stamp_ns
@@ -47,6 +48,8 @@ def test_estimate_is_the_truth_of_the_simulation(bench):
     for fall, strike in zip(falls, model.strikes, strict=False):
         t = (fall.header.stamp.sec * 10**9 + fall.header.stamp.nanosec - start) / 1e9
         assert abs(t - strike.t) < 2e-4
+        first_foot = start_rig.S0 if strike.wheel == 1 else 0.0
+        assert abs(fall.point.x - first_foot - fall.point.z * RigParams().front.step_length) < 1e-9
     for sample in moving[:400]:
         t = (sample.stamp_ns - start) / 1e9
         if t > model.duration:
@@ -76,13 +79,15 @@ def test_killed_simulator_is_stale_and_a_new_one_is_judged_afresh(bench):
     bench.start('simulator', k=60.0, initial_phase_percent=20.0, rate=200.0)
     bench.wait(lambda: len(errors) > count + 100, 'errors of the new run')
     bench.wait(lambda: monitor_says(diagnostics)[0] == 0, 'a monitor that has recovered')
-    for _ in range(3):  # as long as the error is far outside the band, nobody claims the contrary
-        if abs(errors[-1].data) > 10.0:
-            assert not verdicts[-1].data
-            assert monitor_says(diagnostics)[1].startswith('converging')
-        bench.spin(0.3)
-    bench.wait(lambda: verdicts[-1].data, 'synchronized again')
-    assert abs(errors[-1].data) < 8.0
+    claimed = []
+
+    def again():
+        if verdicts[-1].data:
+            claimed.append(errors[-1].data)
+        return claimed
+
+    bench.wait(again, 'synchronized again')
+    assert abs(claimed[0]) < 8.0  # never claimed while the error, which starts at −30 %, is outside the band
 
 
 def test_chain_follows_simulated_time_at_another_pace(bench):
@@ -94,5 +99,5 @@ def test_chain_follows_simulated_time_at_another_pace(bench):
     bench.wait(lambda: verdicts and verdicts[-1].data, 'synchronized')
     read = PhaseSampleReader()
     stamps = [read.read(phase).stamp_ns for phase in phases]
-    assert stamps[0] < 5 * 10**9  # simulated time, from its start
+    assert stamps[-1] < 10**12  # simulated time, which began at 0 with the simulator
     assert {b - a for a, b in pairwise(stamps)} == {5_000_000}

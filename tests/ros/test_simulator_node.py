@@ -101,6 +101,10 @@ def test_coupler_and_slope_change_while_it_runs_and_nonsense_is_refused(bench):
     refused = set_parameter(bench, 'k', -5.0)
     assert not refused.successful
     assert 'k must be ≥ 0 N/m, got -5.0' in refused.reason
+    refused = set_parameter(bench, 'k', 1e15)  # within its bounds, but not with these wheels
+    assert not refused.successful
+    assert 'a stiffer coupler is a rod' in refused.reason
+    assert not set_parameter(bench, 'real_time_factor', 2.0).successful  # without /clock
     assert not set_parameter(bench, 'front.mass', 3.0).successful  # fixed while it runs
     assert set_parameter(bench, 'rate', 200.0).successful
     count = len(heard)

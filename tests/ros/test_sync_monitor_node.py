@@ -29,9 +29,12 @@ def drive(bench: Bench, phase: float, count: int) -> None:
     bench.start_ns = bench.node.get_clock().now().nanoseconds
     errors = bench.hear(SYNC_ERROR)
     publisher = bench.publisher(PHASE_STATE)
-    while not errors:
-        publisher.publish(phase_message(bench, 0, phase))
-        bench.spin(0.02)
+
+    def at_rest(now: int):
+        bench.start_ns = now
+        return phase_message(bench, 0, phase)
+
+    bench.wake(publisher, at_rest, errors)
     for k in range(1, count):
         publisher.publish(phase_message(bench, k, phase))
         bench.spin(0.001)
