@@ -32,7 +32,9 @@ class Observer(Node):
         self.synchronized = False
         """The monitor's verdict."""
         self.failure = ''
-        self._recording = self._moving = False
+        self._recording = False
+        self.moving = False
+        """The wheels have been let go: what comes is recorded."""
         self.diagnoses: dict[str, str] = {}
         """What each node said of itself last."""
         self.age = Age()
@@ -79,7 +81,7 @@ class Observer(Node):
 
     def _on_joints(self, message: Any) -> None:
         joints = self._joints_reader.read(message)
-        if self._moving:
+        if self.moving:
             self.joints.append(joints)
 
     def _on_phase(self, message: Any) -> None:
@@ -87,9 +89,9 @@ class Observer(Node):
         self.age.renew()
         if not self._recording:
             return
-        if not self._moving:
+        if not self.moving:
             self.phases = [phase]
-            self._moving = bool(phase.front.rate or phase.rear.rate)
+            self.moving = bool(phase.front.rate or phase.rear.rate)
             return
         self.phases.append(phase)
         stamp_ns, front, rear, phi, difference, restarts = phase
@@ -103,7 +105,7 @@ class Observer(Node):
 
     def _on_footfall(self, message: Any) -> None:
         fall = footfall(message)
-        if self._moving:
+        if self.moving:
             self.footfalls.append(fall)
             self._to_disk(lambda: self._falls.writerow(fall))
 

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import math
 import os
 import signal
 import sys
@@ -26,6 +27,8 @@ from dcdrw_tracker.sync import SyncMonitor
 
 START_SECONDS = 30.0
 """Limit for the nodes to start, find each other and let data through."""
+ASK_AGAIN_SECONDS = 2.0
+"""A request that has brought nothing for so long is sent again [s]."""
 SILENCE_SECONDS = 3.0
 """Without data for this long, a trial has failed."""
 
@@ -152,8 +155,16 @@ class _Trial:
         client = self.observer.create_client(SetBool, '/simulator/pause')
         self._spin_until(client.service_is_ready, START_SECONDS, 'the service /simulator/pause was not found')
         self.observer.record()
-        answer = client.call_async(SetBool.Request(data=False))
-        self._spin_until(answer.done, START_SECONDS, 'the simulator did not answer')
+        asked = -math.inf
+
+        def moving() -> bool:
+            nonlocal asked
+            if time.monotonic() - asked > ASK_AGAIN_SECONDS:
+                asked = time.monotonic()
+                client.call_async(SetBool.Request(data=False))
+            return self.observer.moving
+
+        self._spin_until(moving, START_SECONDS, 'the simulator did not let the wheels go')
 
     def _watch(self) -> None:
         observer, monitor, fed = self.observer, SyncMonitor(self.params.sync), 0

@@ -97,9 +97,21 @@ class Bench:
         """Call a service and return its answer."""
         client = self.node.create_client(service_type, name)
         self.wait(client.service_is_ready, f'the service {name}')
-        answer = client.call_async(request)
-        self.wait(answer.done, f'an answer of {name}')
-        return answer.result()
+        answers = []
+
+        def answered() -> Any:
+            # A server may find the client later than the client finds it; its answer is then lost: ask again.
+            if not answers or time.monotonic() - asked > 3.0:
+                ask()
+            return next((answer for answer in answers if answer.done()), None)
+
+        def ask() -> None:
+            nonlocal asked
+            asked = time.monotonic()
+            answers.append(client.call_async(request))
+
+        asked = 0.0
+        return self.wait(answered, f'an answer of {name}').result()
 
     def wait(self, condition: Callable[[], Any], what: str, limit: float = PATIENCE) -> Any:
         """Spin until a condition holds; fail at the limit. Returns what the condition returned."""
