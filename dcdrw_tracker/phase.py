@@ -10,6 +10,7 @@ from typing import Annotated, Literal, NamedTuple, get_args
 from dcdrw_msgs_py.quantity import Quantity
 from dcdrw_msgs_py.rig import FRONT, REAR, StanceDistance, WheelShape
 from dcdrw_msgs_py.samples import Footfall, JointSample, PhaseSample, Turn
+from dcdrw_msgs_py.topics import COUPLER, FRONT_WHEEL, REAR_WHEEL
 from dcdrw_tracker.cadence import Cadence, CadenceStatus
 from dcdrw_tracker.rotation import Rotation, Strike, Tolerance
 
@@ -40,9 +41,9 @@ class PhaseParams(NamedTuple):
     restart_samples: Annotated[
         int, Quantity('refused samples in a row that agree, and so make a restart of the source', low=2, live=True)
     ] = 5
-    front_joint: Annotated[str, Quantity('name of the front wheel in joint_states')] = 'front_wheel'
-    rear_joint: Annotated[str, Quantity('name of the rear wheel in joint_states')] = 'rear_wheel'
-    coupler_joint: Annotated[str, Quantity('name of the coupler in joint_states')] = 'coupler'
+    front_joint: Annotated[str, Quantity('name of the front wheel in joint_states')] = FRONT_WHEEL
+    rear_joint: Annotated[str, Quantity('name of the rear wheel in joint_states')] = REAR_WHEEL
+    coupler_joint: Annotated[str, Quantity('name of the coupler in joint_states')] = COUPLER
 
 
 class PhaseUpdate(NamedTuple):
