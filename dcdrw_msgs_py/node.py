@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
-from threading import Event
 from typing import Any, Generic, TypeVar
 
 import rclpy
@@ -157,9 +156,15 @@ def run(name: str, make_node: Callable[[], Node], args: list[str] | None = None)
 
     An impossible parameter or argument ends it with one line and status 2.
     """
-    stopped = Event()
-    for number in (signal.SIGINT, signal.SIGTERM):  # no exception is raised, so a second signal does no harm
-        signal.signal(number, lambda *_: stopped.set())
+    stopped = False
+
+    def stop(*_: object) -> None:
+        # It takes no lock and raises nothing, so that further signals do no harm, even while it runs.
+        nonlocal stopped
+        stopped = True
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, stop)
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
@@ -171,8 +176,11 @@ def run(name: str, make_node: Callable[[], Node], args: list[str] | None = None)
     executor.add_node(node)
     gc.freeze()  # what exists now stays: collections that come need not look at it
     with suppress(ExternalShutdownException):
-        while not stopped.is_set() and rclpy.ok():
+        while not stopped and rclpy.ok():
             executor.spin_once(timeout_sec=SPIN_SECONDS)
+    # In this order, so that no thread of DDS outlives what it works on: neither waits for Python's own end.
+    executor.shutdown()
+    node.destroy_node()
     rclpy.try_shutdown()
     for number in (signal.SIGINT, signal.SIGTERM):  # Python itself ends now, and would die of a second signal
         signal.signal(number, signal.SIG_IGN)
