@@ -6,16 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from dcdrw.summary import SECOND, TrialData, pitch
+from dcdrw.analysis import SECOND, Analysis, Floats
 from dcdrw_msgs_py.rig import FRONT, REAR
-from dcdrw_tracker.sync import SyncStatus
 
 # Okabe and Ito's palette: told apart by the colour-blind, and in grey by lightness.
 _COLOURS = {FRONT: '#0072B2', REAR: '#D55E00'}
 _PHASE, _BAND, _FORCE = '#000000', '#009E73', '#555555'
 
 
-def draw_trial(data: TrialData, status: SyncStatus, title: str, path: Path) -> None:
+def draw_trial(trial: Analysis, title: str, path: Path) -> None:
     """Draw a trial into a PNG, PDF or SVG file, by the ending of its name.
 
     Raises:
@@ -30,14 +29,14 @@ def draw_trial(data: TrialData, status: SyncStatus, title: str, path: Path) -> N
     figure = Figure(figsize=(10, 9), layout='constrained')
     FigureCanvasAgg(figure)
     angles, phase, gait, force = figure.subplots(4, 1, sharex=True, height_ratios=(3, 3, 1.3, 2))
-    start_ns = data.phases[0].stamp_ns if data.phases else 0
-    _draw_angles(angles, data, start_ns)
-    _draw_phase(phase, data, status, start_ns)
-    _draw_gait(gait, data, start_ns)
-    _draw_force(force, data, start_ns)
+    time = trial.motion.seconds
+    _draw_angles(angles, trial, time)
+    _draw_phase(phase, trial, time)
+    _draw_gait(gait, trial, time)
+    _draw_force(force, trial, time)
     force.set_xlabel('time [s]')
-    if data.phases:
-        force.set_xlim(0.0, max((data.phases[-1].stamp_ns - start_ns) / SECOND, 1e-3))
+    if len(time):
+        force.set_xlim(0.0, max(float(time[-1]), 1e-3))
     figure.suptitle(title, wrap=True)
     for axes in (angles, phase, gait, force):
         axes.spines[['top', 'right']].set_visible(False)
@@ -49,36 +48,37 @@ def _legend(axes: Any) -> None:
     axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False, borderaxespad=0.1)
 
 
-def _times(stamps: Any, start_ns: int) -> Any:
-    return (np.array(stamps, dtype=np.int64) - start_ns) / SECOND
+def _second(trial: Analysis, stamp_ns: int) -> float:
+    return float(stamp_ns - trial.motion.stamp_ns[0]) / SECOND
 
 
-def _draw_angles(axes: Any, data: TrialData, start_ns: int) -> None:
-    time = _times([phase.stamp_ns for phase in data.phases], start_ns)
-    for wheel, name in ((FRONT, 'θ₁ front'), (REAR, 'θ₂ rear')):
-        theta = np.degrees([getattr(phase, wheel).angle for phase in data.phases])
-        strikes = np.abs(np.diff(theta, prepend=theta[:1])) > math.degrees(pitch(data)) / 2
-        theta[strikes] = math.nan  # a strike is a jump, not a motion
-        axes.plot(time, theta, color=_COLOURS[wheel], label=name, linewidth=1.3,
+def _broken(angle: Floats, step: float) -> Floats:
+    """The angle in degrees, cut where it wraps: a strike is a jump, not a motion."""
+    degrees = np.degrees(angle)
+    degrees[np.abs(np.diff(degrees, prepend=degrees[:1])) > step / 2] = math.nan
+    return degrees
+
+
+def _draw_angles(axes: Any, trial: Analysis, time: Floats) -> None:
+    motion = trial.motion
+    for wheel, theta, name in ((FRONT, motion.theta1, 'θ₁ front'), (REAR, motion.theta2, 'θ₂ rear')):
+        axes.plot(time, _broken(theta, math.degrees(trial.pitch)), color=_COLOURS[wheel], label=name, linewidth=1.3,
                   linestyle='-' if wheel == FRONT else '--')
     axes.axhline(0.0, color='0.85', zorder=0, linewidth=0.8)
     axes.set_ylabel('stance angle [°]')
     _legend(axes)
 
 
-def _draw_phase(axes: Any, data: TrialData, status: SyncStatus, start_ns: int) -> None:
-    time = _times([phase.stamp_ns for phase in data.phases], start_ns)
-    step = math.degrees(pitch(data))
-    phi = np.degrees([phase.phi.angle for phase in data.phases])
-    phi[np.abs(np.diff(phi, prepend=phi[:1])) > step / 2] = math.nan
-    band = data.params.sync.band_percent / 100.0 * step
+def _draw_phase(axes: Any, trial: Analysis, time: Floats) -> None:
+    step = math.degrees(trial.pitch)
+    band = trial.params.sync.band_percent / 100.0 * step
     axes.axhspan(step / 2 - band, step / 2 + band, color=_BAND, alpha=0.18, linewidth=0,
-                 label=f'±{data.params.sync.band_percent:g} % of 50 %')
+                 label=f'±{trial.params.sync.band_percent:g} % of 50 %')
     axes.axhline(step / 2, color=_BAND, linewidth=1)
-    axes.plot(time, phi, color=_PHASE, linewidth=1.3, label='φ')
-    for fall in data.footfalls:
-        if fall.wheel == FRONT and fall.steps == status.steps_to_synchronization:
-            axes.axvline((fall.stamp_ns - start_ns) / SECOND, color=_BAND, linestyle=':', linewidth=1.5,
+    axes.plot(time, _broken(trial.motion.phi, step), color=_PHASE, linewidth=1.3, label='φ')
+    for fall in trial.footfalls:
+        if fall.wheel == FRONT and fall.steps == trial.status.steps_to_synchronization:
+            axes.axvline(_second(trial, fall.stamp_ns), color=_BAND, linestyle=':', linewidth=1.5,
                          label=f'from step {fall.steps} on')
     axes.set_ylim(0.0, step)
     axes.set_ylabel('phase difference φ [°]')
@@ -87,12 +87,12 @@ def _draw_phase(axes: Any, data: TrialData, status: SyncStatus, start_ns: int) -
     _legend(axes)
 
 
-def _draw_gait(axes: Any, data: TrialData, start_ns: int) -> None:
+def _draw_gait(axes: Any, trial: Analysis, time: Floats) -> None:
     """Each bar is one stance, from a footfall to the next of that wheel; the legs alternate in shade."""
-    end = (data.phases[-1].stamp_ns - start_ns) / SECOND if data.phases else 0.0
+    end = float(time[-1]) if len(time) else 0.0
     for row, wheel in enumerate((REAR, FRONT)):
-        falls = [(0.0, 0)] + [((fall.stamp_ns - start_ns) / SECOND, fall.steps)
-                              for fall in data.footfalls if fall.wheel == wheel]
+        falls = [(0.0, 0)] + [(_second(trial, fall.stamp_ns), fall.steps)
+                              for fall in trial.footfalls if fall.wheel == wheel]
         for (begin, steps), (until, _) in zip(falls, [*falls[1:], (end, 0)], strict=True):
             axes.barh(row, until - begin, left=begin, height=0.6, color=_COLOURS[wheel],
                       alpha=0.85 if steps % 2 else 0.35, linewidth=0)
@@ -103,12 +103,11 @@ def _draw_gait(axes: Any, data: TrialData, start_ns: int) -> None:
     axes.set_ylabel('stances')
 
 
-def _draw_force(axes: Any, data: TrialData, start_ns: int) -> None:
-    known = [joints for joints in data.joints if not math.isnan(joints.coupler.force)]
+def _draw_force(axes: Any, trial: Analysis, time: Floats) -> None:
+    known = ~np.isnan(trial.motion.coupler_force)
     axes.axhline(0.0, color='0.85', zorder=0, linewidth=0.8)
     axes.set_ylabel('coupler force [N]')
-    if known:
-        axes.plot(_times([joints.stamp_ns for joints in known], start_ns),
-                  [joints.coupler.force for joints in known], color=_FORCE, linewidth=1.0)
+    if known.any():
+        axes.plot(time[known], trial.motion.coupler_force[known], color=_FORCE, linewidth=1.0)
     else:
         axes.text(0.5, 0.5, 'the source does not tell the coupler force', transform=axes.transAxes, ha='center')

@@ -1,68 +1,51 @@
-"""The listener of a trial: what the nodes published, kept in memory and, as it comes, in files."""
+"""The listener of a trial: what the nodes publish, as far as a person wants to see it live. The recorder keeps it."""
 
-import csv
 from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 from rclpy.node import Node
 
-from dcdrw_msgs_py.messages import JointSampleReader, PhaseSampleReader, footfall
+from dcdrw_msgs_py.diagnosis import Diagnosis, Level
+from dcdrw_msgs_py.messages import PhaseSampleReader, footfall
 from dcdrw_msgs_py.node import Age, listen
-from dcdrw_msgs_py.samples import Footfall, JointSample, PhaseSample
-from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, JOINT_STATES, PHASE_STATE, SYNC_ERROR, SYNCHRONIZED
-
-SAMPLES_HEADER = ('stamp_ns', 'theta1', 'omega1', 'theta2', 'omega2', 'phi', 'phi_rate', 'step_difference',
-                  'restarts')
-FOOTFALLS_HEADER = ('wheel', 'stamp_ns', 'x', 'steps')
+from dcdrw_msgs_py.rig import FRONT, REAR
+from dcdrw_msgs_py.samples import PhaseSample
+from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, PHASE_STATE, SYNC_ERROR, SYNCHRONIZED
+from dcdrw_tracker.sync import SyncMonitor, SyncParams
 
 
 class Observer(Node):
-    """Hears every topic of a trial."""
+    """Hears what a trial comes to."""
 
-    def __init__(self, folder: Path, **kwargs: Any) -> None:
+    def __init__(self, params: SyncParams, **kwargs: Any) -> None:
         super().__init__('trial', **kwargs)
-        self._folder = folder
-        self.joints: list[JointSample] = []
-        self.phases: list[PhaseSample] = []
-        self.footfalls: list[Footfall] = []
+        self.monitor = SyncMonitor(params)
+        """Sees the wheels from the last sample before they move."""
         self.heard: set[str] = set()
         """Topics of which a message has come."""
+        self.strikes = {FRONT: 0, REAR: 0}
         self.synchronized = False
         """The monitor's verdict."""
-        self.failure = ''
-        self._recording = False
         self.moving = False
-        """The wheels have been let go: what comes is recorded."""
-        self.diagnoses: dict[str, str] = {}
+        """The wheels have been let go."""
+        self.diagnoses: dict[str, Diagnosis] = {}
         """What each node said of itself last."""
         self.age = Age()
-        self._joints_reader, self._phase_reader = JointSampleReader(), PhaseSampleReader()
-        self._files = [(folder / name).open('w', encoding='utf-8', newline='')
-                       for name in ('samples.csv', 'footfalls.csv')]
-        self._samples, self._falls = (csv.writer(file) for file in self._files)
-        self._samples.writerow(SAMPLES_HEADER)
-        self._falls.writerow(FOOTFALLS_HEADER)
-        for topic, callback in ((JOINT_STATES, self._on_joints), (PHASE_STATE, self._on_phase),
-                                (SYNC_ERROR, self._on_error), (SYNCHRONIZED, self._on_synchronized),
-                                (FOOTFALLS, self._on_footfall), (DIAGNOSTICS, self._on_diagnostics)):
+        self._first: PhaseSample | None = None
+        self._last: PhaseSample | None = None
+        self._reader = PhaseSampleReader()
+        for topic, callback in ((PHASE_STATE, self._on_phase), (SYNC_ERROR, self._on_error),
+                                (SYNCHRONIZED, self._on_synchronized), (FOOTFALLS, self._on_footfall),
+                                (DIAGNOSTICS, self._on_diagnostics)):
             listen(self, topic, self._bearing(topic.name, callback))
 
-    def record(self) -> None:
-        """Begin with the last sample before the wheels move, which are now let go."""
-        self._recording = True
-        self.age.renew()
-
-    def flush(self) -> None:
-        """Bring to the disk what has come so far."""
-        for file in self._files:
-            self._to_disk(file.flush)
-
-    def close(self) -> None:
-        """Close the files."""
-        for file in self._files:
-            self._to_disk(file.close)
+    @property
+    def seconds(self) -> float:
+        """How long the wheels have been moving, by the stamps [s]."""
+        if not (self.moving and self._first and self._last):
+            return 0.0
+        return (self._last.stamp_ns - self._first.stamp_ns) * 1e-9
 
     def _bearing(self, name: str, callback: Callable[[Any], None]) -> Callable[[Any], None]:
         """A callback that passes over what it cannot read: on a shared domain others may publish, too."""
@@ -72,30 +55,17 @@ class Observer(Node):
                 self.heard.add(name)
         return bear
 
-    def _to_disk(self, write: Callable[[], object]) -> None:
-        try:
-            write()
-        except OSError as error:  # a full disk ends the record, not what is there
-            self._recording = False
-            self.failure = f'{error.strerror}: {self._folder}'
-
-    def _on_joints(self, message: Any) -> None:
-        joints = self._joints_reader.read(message)
-        if self.moving:
-            self.joints.append(joints)
-
     def _on_phase(self, message: Any) -> None:
-        phase = self._phase_reader.read(message)
+        phase = self._reader.read(message)
         self.age.renew()
-        if not self._recording:
-            return
         if not self.moving:
-            self.phases = [phase]
             self.moving = bool(phase.front.rate or phase.rear.rate)
-            return
-        self.phases.append(phase)
-        stamp_ns, front, rear, phi, difference, restarts = phase
-        self._to_disk(lambda: self._samples.writerow((stamp_ns, *front, *rear, *phi, difference, restarts)))
+            if self.moving:
+                self._first = self._last or phase
+                self.monitor.update(self._first)
+        if self.moving:
+            self.monitor.update(phase)
+        self._last = phase
 
     def _on_error(self, message: Any) -> None:
         """That it comes is all."""
@@ -104,12 +74,11 @@ class Observer(Node):
         self.synchronized = message.data
 
     def _on_footfall(self, message: Any) -> None:
-        fall = footfall(message)
         if self.moving:
-            self.footfalls.append(fall)
-            self._to_disk(lambda: self._falls.writerow(fall))
+            self.strikes[footfall(message).wheel] += 1
 
     def _on_diagnostics(self, message: Any) -> None:
         for status in message.status:
-            self.diagnoses[status.name] = status.message
-
+            self.diagnoses[status.name] = Diagnosis(
+                Level(min(status.level[0], Level.STALE)), status.message,
+                {pair.key: pair.value for pair in status.values})

@@ -1,7 +1,6 @@
-"""`dcdrw trial`: simulator, phase estimator and monitor as three processes, watched live and judged at the end."""
+"""`dcdrw trial`: simulator, phase estimator, monitor and recorder as processes, watched live, judged by the record."""
 
 import argparse
-import json
 import math
 import os
 import signal
@@ -13,17 +12,21 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from dcdrw.analysis import analyze
+from dcdrw.analyze import describe, read_trial, write_results
 from dcdrw.arguments import domain, number, positive
-from dcdrw.executables import EXECUTABLES
-from dcdrw.figure import draw_trial
+from dcdrw.executables import RECORDER, TRIAL
 from dcdrw.parameter_file import TrialParams, add_rig_options, chosen_params, write_parameter_file
 from dcdrw.processes import NodeProcess, free_domain
-from dcdrw.summary import SECOND, TrialData, judge, summarize
+from dcdrw.recorder import RecorderParams, require_libraries
+from dcdrw.recording import RECORDING
+from dcdrw.summary import sentence
+from dcdrw_msgs_py.diagnosis import Level
 from dcdrw_msgs_py.quantity import check
+from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.topics import FOOTFALLS, JOINT_STATES, PHASE_STATE, SYNC_ERROR
 from dcdrw_tracker.diagnostics import phase_text
 from dcdrw_tracker.phase import PhaseParams
-from dcdrw_tracker.sync import SyncMonitor
 
 START_SECONDS = 30.0
 """Limit for the nodes to start, find each other and let data through."""
@@ -33,8 +36,9 @@ SILENCE_SECONDS = 3.0
 """Without data for this long, a trial has failed."""
 
 _EPILOG = """\
-The nodes run on a free ROS domain that only this machine sees, unless --domain names one. DIR gets summary.json,
-trial.png, samples.csv, footfalls.csv and what each node printed. Exit status: 0 the trial ran to its end (whether
+The nodes run on a free ROS domain that only this machine sees, unless --domain names one. DIR gets the
+recording (for ros2 bag, dcdrw replay and dcdrw analyze), summary.json, trial.png, samples.csv, footfalls.csv and what
+each node printed. Exit status: 0 the trial ran to its end (whether
 or not the pair fell into step: see the summary), 1 a node died or no data came, 2 wrong input, 130 interrupted.
 """
 
@@ -59,6 +63,7 @@ def add_command(commands: Any) -> None:
     parser.add_argument('--out', type=Path, metavar='DIR', help='where to write; must not exist, or be empty '
                         '(default: trials/DATE-TIME)')
     parser.add_argument('--domain', type=domain, metavar='N', help='ROS domain to use instead of a free one')
+    parser.add_argument('--note', default='', metavar='TEXT', help='what to keep with the recording')
     parser.add_argument('--quiet', action='store_true', help='no live progress')
     parser.set_defaults(run=trial, prog='dcdrw trial')
 
@@ -70,6 +75,7 @@ def trial(options: argparse.Namespace) -> int:
     except ImportError:
         raise ValueError("a trial needs rclpy: source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' "
                          'ros-jazzy-common-interfaces') from None
+    require_libraries()
     params = chosen_params(options)
     if options.initial_phase is not None:
         params = params._replace(simulator=check(
@@ -82,16 +88,22 @@ def trial(options: argparse.Namespace) -> int:
     params = params._replace(phase=params.phase._replace(
         S0=start.S0 - start.front.step_length, front_joint=joints.front_joint, rear_joint=joints.rear_joint,
         coupler_joint=joints.coupler_joint))
-    folder = _folder(options.out)
+    folder = free_folder(options.out)
+    folder.mkdir(parents=True, exist_ok=True)
     with nullcontext(options.domain) if options.domain is not None else free_domain() as chosen:
         return _Trial(params, options, folder, chosen).run()
 
 
-def _folder(chosen: Path | None) -> Path:
+def free_folder(chosen: Path | None) -> Path:
+    """The folder for what a trial brings, by default one for this second; nothing is made yet.
+
+    Raises:
+        ValueError: it holds something already.
+
+    """
     folder = chosen or Path('trials') / datetime.now().strftime('%Y%m%d-%H%M%S')
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise ValueError(f'{folder} exists already, not overwriting; choose another --out')
-    folder.mkdir(parents=True, exist_ok=True)
     return folder
 
 
@@ -122,8 +134,7 @@ class _Trial:
                 stack.callback(signal.signal, number_, signal.signal(number_, interrupt))
             rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
             stack.callback(rclpy.try_shutdown)
-            self.observer = Observer(self.folder)
-            stack.callback(self.observer.close)
+            self.observer = Observer(self.params.sync)
             self.executor = make_executor()
             self.executor.add_node(self.observer)
             stack.callback(self._stop_nodes)
@@ -140,21 +151,30 @@ class _Trial:
     def _start_nodes(self, environment: dict[str, str]) -> None:
         file = self.folder / 'parameters.yaml'
         held = self.params.simulator._replace(paused=True)
-        write_parameter_file(self.params._replace(simulator=held), file)
-        for node in reversed(EXECUTABLES):  # who listens, first
+        recorder = RecorderParams(str(self.folder / RECORDING), self.options.note, record=True)
+        write_parameter_file((*self.params._replace(simulator=held), recorder), file)
+        for node in (RECORDER, *reversed(TRIAL)):  # who listens, first
             self.nodes.append(NodeProcess(node.name, node.module, ['--ros-args', '--params-file', str(file)],
                                           environment, self.folder / f'{node.name}.log'))
         self._say('starting the nodes ...')
-        needed = {topic.name for topic in (JOINT_STATES, PHASE_STATE, SYNC_ERROR)}
-        self._spin_until(lambda: needed <= self.observer.heard and self.observer.count_publishers(FOOTFALLS.name) > 0,
-                         START_SECONDS, 'no data came through the nodes')
+        self._spin_until(self._all_at_work, START_SECONDS, 'no data came through the nodes')
+
+    def _all_at_work(self) -> bool:
+        """Whether data come through the whole chain, and the recorder has them, and every parameter."""
+        needed, recorder = (PHASE_STATE, SYNC_ERROR), self.observer.diagnoses.get(RECORDER.name)
+        if recorder is None or not {topic.name for topic in needed} <= self.observer.heard:
+            return False
+        told = recorder.values
+        return (all(int(told.get(f'messages of /{topic.name}', 0)) > 0 for topic in (JOINT_STATES, *needed))
+                and f'messages of /{FOOTFALLS.name}' in told
+                and all(node.name in told.get('parameters of', '') for node in TRIAL))
 
     def _let_go(self) -> None:
         """Release the wheels, which were held until the whole chain was seen to work."""
         from std_srvs.srv import SetBool
         client = self.observer.create_client(SetBool, '/simulator/pause')
         self._spin_until(client.service_is_ready, START_SECONDS, 'the service /simulator/pause was not found')
-        self.observer.record()
+        self.observer.age.renew()
         asked = -math.inf
 
         def moving() -> bool:
@@ -167,33 +187,21 @@ class _Trial:
         self._spin_until(moving, START_SECONDS, 'the simulator did not let the wheels go')
 
     def _watch(self) -> None:
-        observer, monitor, fed = self.observer, SyncMonitor(self.params.sync), 0
         shown = 0.0
-        while True:
+        while not self.interrupted and self.observer.seconds < self.options.seconds:
             self._spin_once()
-            while fed < len(observer.phases):
-                monitor.update(observer.phases[fed])
-                fed += 1
-            now = time.monotonic()
-            if now - shown >= (0.1 if sys.stdout.isatty() else 1.0):
-                observer.flush()
-                self._show(monitor)
-                shown = now
-            if self.interrupted or (fed and self._elapsed() >= self.options.seconds):
-                return
-            if observer.age.seconds > SILENCE_SECONDS:
+            if time.monotonic() - shown >= (0.1 if sys.stdout.isatty() else 1.0):
+                self._show()
+                shown = time.monotonic()
+            if self.observer.age.seconds > SILENCE_SECONDS:
                 raise TrialError(f'no data for {SILENCE_SECONDS:g} s')
 
-    def _elapsed(self) -> float:
-        phases = self.observer.phases
-        return (phases[-1].stamp_ns - phases[0].stamp_ns) / SECOND if phases else 0.0
-
-    def _show(self, monitor: SyncMonitor) -> None:
-        status, falls = monitor.status(), self.observer.footfalls
+    def _show(self) -> None:
+        status, strikes = self.observer.monitor.status(), self.observer.strikes
         state = 'SYNCHRONIZED' if self.observer.synchronized else 'STALLED' if status.stalled else 'CONVERGING'
-        front = sum(fall.wheel == 'front' for fall in falls)
-        self._say(f'{self._elapsed():5.1f} s  phase {phase_text(status.phase)}  error {status.error_percent:+5.1f} %  '
-                  f'n {status.step_difference:+d}  strikes {front} + {len(falls) - front}  {state}')
+        self._say(f'{self.observer.seconds:5.1f} s  phase {phase_text(status.phase)}  '
+                  f'error {status.error_percent:+5.1f} %  n {status.step_difference:+d}  '
+                  f'strikes {strikes[FRONT]} + {strikes[REAR]}  {state}')
 
     def _say(self, text: str) -> None:
         if self.options.quiet:
@@ -209,7 +217,7 @@ class _Trial:
             if self.interrupted:
                 raise TrialError(INTERRUPTED)
             if time.monotonic() > end:
-                said = '; '.join(f'{name}: {message}' for name, message in self.observer.diagnoses.items())
+                said = '; '.join(f'{name}: {said.message}' for name, said in self.observer.diagnoses.items())
                 raise TrialError(f'{otherwise} ({said or "the nodes say nothing"})')
             self._spin_once()
 
@@ -218,30 +226,32 @@ class _Trial:
         for node in self.nodes:
             if node.failure and not self.interrupted:
                 raise TrialError(node.failure)
-        if self.observer.failure:
-            raise TrialError(self.observer.failure)
+        recorder = self.observer.diagnoses.get(RECORDER.name)
+        if recorder and recorder.level is Level.ERROR:
+            raise TrialError(recorder.message)
 
     def _stop_nodes(self) -> None:
-        for node in self.nodes:
-            node.interrupt()
-        for node in self.nodes:
-            node.wait()
+        """The recorder first: what the others publish when they end is no part of the trial."""
+        for group in (self.nodes[:1], self.nodes[1:]):
+            for node in group:
+                node.interrupt()
+            for node in group:
+                node.wait()
 
     def _finish(self, failure: str) -> int:
-        """Write what there is, whatever happened."""
-        observer = self.observer
+        """Judge and write what there is, whatever happened."""
         if not self.options.quiet and sys.stdout.isatty():
             print()
-        data = TrialData(self.params, observer.joints, observer.phases, observer.footfalls)
-        status, errors = judge(data)
-        summary = summarize(data, status, errors)
         end = failure or ('interrupted' if self.interrupted else 'complete')
-        content = json.dumps({'end': end, **summary, 'diagnostics': observer.diagnoses}, indent=1, ensure_ascii=False)
-        print(summary['sentence'])
         try:
-            (self.folder / 'summary.json').write_text(content + '\n', encoding='utf-8')
-            if data.phases:
-                draw_trial(data, status, summary['sentence'], self.folder / 'trial.png')
+            trial, agreements = read_trial(self.folder / RECORDING, self.params)
+        except (ValueError, OSError) as error:
+            trial, agreements = analyze([], self.params), {}
+            failure = failure or str(error)
+        print(sentence(trial))
+        try:
+            write_results(trial, self.folder, end=end, agreement=describe(agreements), diagnostics={
+                name: said.message for name, said in self.observer.diagnoses.items()})
             print(f'Written: {self.folder}/')
         except ValueError as error:
             print(f'dcdrw trial: no picture: {error}', file=sys.stderr)
@@ -250,4 +260,3 @@ class _Trial:
         if failure:
             print(f'dcdrw trial: {failure}', file=sys.stderr)
         return 130 if self.interrupted else 1 if failure else 0
-

@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -30,14 +31,12 @@ def start(tmp_path: Path, *arguments: str, rig: str = STIFF) -> subprocess.Popen
         env={**os.environ, 'PYTHONPATH': str(ROOT)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-def wait_for_motion(tmp_path: Path, process: subprocess.Popen[str]) -> None:
-    """Wait until samples are on the disk."""
-    samples = tmp_path / 'out' / 'samples.csv'
-    end = time.monotonic() + 40
-    while not samples.exists() or samples.stat().st_size < 2000:
-        assert time.monotonic() < end, 'no samples came'
-        assert process.poll() is None, process.communicate()
-        time.sleep(0.05)
+def wait_for_motion(process: subprocess.Popen[str]) -> None:
+    """Wait until the trial shows that the wheels roll."""
+    for line in process.stdout:
+        if 'strikes' in line and 'strikes 0 + 0' not in line:
+            return
+    raise AssertionError(process.communicate()[1])
 
 
 def find(process: subprocess.Popen[str], module: str) -> list[int]:
@@ -71,24 +70,25 @@ def test_trial_ends_with_summary_picture_and_sentence(tmp_path):
     rows = list(csv.DictReader((tmp_path / 'out' / 'samples.csv').read_text().splitlines()))
     assert len(rows) == pytest.approx(1200, abs=5)
     assert all(abs(float(row['theta1'])) <= math.pi / 12 + 1e-9 for row in rows)
-    for name in ('simulator', 'phase_estimator', 'sync_monitor'):
+    for name in ('simulator', 'phase_estimator', 'sync_monitor', 'recorder'):
         assert 'Traceback' not in (tmp_path / 'out' / f'{name}.log').read_text()
 
 
 def test_interrupt_keeps_what_there_is(tmp_path):
     process = start(tmp_path, '--seconds', '600')
-    wait_for_motion(tmp_path, process)
+    wait_for_motion(process)
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=40)
     assert process.returncode == 130
     assert 'Traceback' not in errors
     assert summary(tmp_path)['end'] == 'interrupted'
     assert (tmp_path / 'out' / 'trial.png').exists()
+    assert (tmp_path / 'out' / 'recording' / 'metadata.yaml').exists()
 
 
 def test_dead_node_ends_the_trial_with_the_reason(tmp_path):
     process = start(tmp_path, '--seconds', '600')
-    wait_for_motion(tmp_path, process)
+    wait_for_motion(process)
     (node,) = find(process, 'phase_estimator_node')
     os.kill(node, signal.SIGKILL)
     _, errors = process.communicate(timeout=40)
@@ -98,9 +98,22 @@ def test_dead_node_ends_the_trial_with_the_reason(tmp_path):
     assert (tmp_path / 'out' / 'samples.csv').stat().st_size > 2000
 
 
+def test_full_disk_ends_the_trial_and_keeps_what_is_there(tmp_path):
+    process = start(tmp_path, '--seconds', '600')
+    wait_for_motion(process)
+    (node,) = find(process, 'recorder_node')
+    size = (tmp_path / 'out' / 'recording' / 'recording_0.mcap').stat().st_size
+    resource.prlimit(node, resource.RLIMIT_FSIZE, (size + 100, size + 100))
+    _, errors = process.communicate(timeout=40)
+    assert process.returncode == 1
+    assert 'dcdrw trial: the recording ended: File too large: out/recording; what came before is kept' in errors
+    assert summary(tmp_path)['end'].startswith('the recording ended: File too large')
+    assert summary(tmp_path)['samples']['joint_states'] > 50
+
+
 def test_silence_ends_the_trial_with_the_reason(tmp_path):
     process = start(tmp_path, '--seconds', '600')
-    wait_for_motion(tmp_path, process)
+    wait_for_motion(process)
     (node,) = find(process, 'simulator_node')
     os.kill(node, signal.SIGSTOP)
     _, errors = process.communicate(timeout=40)
@@ -111,9 +124,9 @@ def test_silence_ends_the_trial_with_the_reason(tmp_path):
 
 def test_nodes_end_with_a_trial_that_is_killed(tmp_path):
     process = start(tmp_path, '--seconds', '600')
-    wait_for_motion(tmp_path, process)
+    wait_for_motion(process)
     nodes = find(process, '_node')
-    assert len(nodes) == 3
+    assert len(nodes) == 4
     process.kill()
     process.communicate()
     end = time.monotonic() + 10

@@ -1,0 +1,102 @@
+"""JointState messages as they came off the wire (CDR), decoded many at once: numpy alone, no ROS."""
+
+import struct
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class JointBatch(NamedTuple):
+    """JointState messages that name the same joints; rows are messages, columns joints."""
+
+    frame: str
+    names: tuple[str, ...]
+    stamp_ns: NDArray[np.int64]
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    effort: NDArray[np.float64]
+    """NaN where not given for each joint."""
+    error: str = ''
+    """Why these messages cannot be read; empty where they can."""
+
+    @property
+    def messages(self) -> int:
+        """How many messages these are."""
+        return len(self.stamp_ns)
+
+
+def decode_joints(messages: list[bytes]) -> Iterator[JointBatch]:
+    """Decode serialized JointState messages of one length.
+
+    All whose bytes agree in everything but stamp and numbers have the layout of the first, and are read at once.
+    """
+    rows = np.frombuffer(b''.join(messages), np.uint8).reshape(len(messages), -1)
+    while len(rows):
+        try:
+            layout = _Layout(rows[0].tobytes())
+        except (struct.error, UnicodeDecodeError, IndexError):
+            yield _MALFORMED
+            rows = rows[1:]
+            continue
+        fixed = rows[:, layout.fixed]
+        differs = (fixed != fixed[0]).any(axis=1)
+        count = int(differs.argmax()) if differs.any() else len(rows)
+        yield layout.read(rows[:count])
+        rows = rows[count:]
+
+
+_NONE = np.empty((1, 0))
+_MALFORMED = JointBatch('', (), np.zeros(1, np.int64), _NONE, _NONE, _NONE, 'the message is malformed')
+
+
+class _Layout:
+    """Where a serialized JointState has its numbers (CDR: aligned to their size, counted from the fifth byte)."""
+
+    def __init__(self, data: bytes) -> None:
+        self._order = '<' if data[1] & 1 else '>'
+        self._data, self._at = data, 12  # after the encapsulation and the stamp
+        self.fixed = np.zeros(len(data), bool)
+        self.fixed[:4] = True
+        self.frame = self._string()
+        self.names = tuple(self._string() for _ in range(self._count()))
+        self._columns = [self._doubles() for _ in range(3)]
+
+    def read(self, rows: NDArray[np.uint8]) -> JointBatch:
+        """The messages of this layout."""
+        stamps = np.ascontiguousarray(rows[:, 4:12]).view(f'{self._order}i4').reshape(-1, 2).astype(np.int64)
+        stamp_ns = stamps[:, 0] * 1_000_000_000 + (stamps[:, 1] & 0xFFFFFFFF)
+        columns = []
+        for begin, count in self._columns:
+            numbers = np.ascontiguousarray(rows[:, begin:begin + 8 * count]).view(f'{self._order}f8')
+            given = count == len(self.names)
+            columns.append(numbers.astype(np.float64).reshape(len(rows), count) if given
+                           else np.full((len(rows), len(self.names)), np.nan))
+        positions = self._columns[0][1]
+        error = '' if positions == len(self.names) else (
+            f'{len(self.names)} joints are named but {positions} positions given')
+        return JointBatch(self.frame, self.names, stamp_ns, columns[0], columns[1], columns[2], error)
+
+    def _count(self) -> int:
+        self._at += -self._at % 4
+        (count,) = struct.unpack_from(f'{self._order}I', self._data, self._at)
+        self.fixed[self._at:self._at + 4] = True
+        self._at += 4
+        return int(count)
+
+    def _string(self) -> str:
+        length = self._count()
+        text = struct.unpack_from(f'{length}s', self._data, self._at)[0]
+        self.fixed[self._at:self._at + length] = True
+        self._at += length
+        return str(text[:-1], 'utf-8')
+
+    def _doubles(self) -> tuple[int, int]:
+        """Where they begin, and how many there are."""
+        count = self._count()
+        begin = self._at + -(self._at - 4) % 8 if count else self._at
+        self._at = begin + 8 * count
+        if self._at > len(self._data):
+            raise IndexError
+        return begin, count

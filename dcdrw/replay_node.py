@@ -1,0 +1,107 @@
+"""The node of `dcdrw replay`: recorded joint states once more, with their own stamps, and the clock that they tell."""
+
+import struct
+import time
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+from builtin_interfaces.msg import Time
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+
+from dcdrw.recording import Message, Recording
+from dcdrw_msgs_py.messages import SECOND
+from dcdrw_msgs_py.node import advertise, steady_clock
+from dcdrw_msgs_py.topics import CLOCK, JOINT_STATES
+
+TICK_SECONDS = 0.001
+SETTLE_SECONDS = 1.0
+"""So long the listeners must have been the same before the replay begins: DDS finds them one by one."""
+CLOCK_NS = 10_000_000
+"""How far the stamps go between two messages on /clock."""
+LONGEST_SECONDS = 0.05
+"""Time after which a tick lets others in, where the replay is behind [s]."""
+
+
+class Part(NamedTuple):
+    """What of a recording is replayed, and how fast."""
+
+    begin_ns: int
+    end_ns: int
+    rate: float
+    loop: bool
+
+
+class ReplayNode(Node):
+    """Publishes each joint state when it is due by the recorder's log; what is late is sent at once, never dropped."""
+
+    def __init__(self, recording: Recording, topic: str, part: Part, names: Mapping[str, str], **kwargs: Any) -> None:
+        super().__init__('replay', **kwargs)
+        self._recording, self._topic, self._part, self._names = recording, topic, part, names
+        self._joints = advertise(self, JOINT_STATES)
+        self._clock = advertise(self, CLOCK)
+        self.sent = 0
+        self.log_ns = part.begin_ns
+        """Where in the recording the replay is."""
+        self.done = False
+        self._listeners = 0
+        self._since = time.monotonic()
+        self.playing = False
+        self._messages: Iterator[Message] = iter(())
+        self._next: Message | None = None
+        self._begun = 0.0
+        self._told_ns = -CLOCK_NS
+        self._timer = self.create_timer(TICK_SECONDS, self._tick, clock=steady_clock())
+
+    def _begin(self) -> None:
+        part = self._part
+        self._messages = self._recording.messages([self._topic], part.begin_ns, part.end_ns)
+        self._next = next(self._messages, None)
+        self._begun = time.monotonic()
+        self.playing = True
+
+    def _tick(self) -> None:
+        if self.playing:
+            self._play()
+        elif not self.done:
+            self._wait()
+
+    def _wait(self) -> None:
+        """Begin when somebody listens, and nobody new has come for a while."""
+        now = time.monotonic()
+        listeners = self.count_subscribers(JOINT_STATES.name) + self.count_subscribers(CLOCK.name)
+        if listeners != self._listeners:
+            self._listeners, self._since = listeners, now
+        if self._joints.get_subscription_count() and now - self._since >= SETTLE_SECONDS:
+            self._begin()
+
+    def _play(self) -> None:
+        now = time.monotonic()
+        until_ns = self._part.begin_ns + int((now - self._begun) * self._part.rate * 1e9)
+        while self._next and self._next.log_ns <= until_ns and time.monotonic() - now < LONGEST_SECONDS:
+            self._publish(self._next)
+            self.log_ns = self._next.log_ns
+            self._next = next(self._messages, None)
+        if self._next is None:
+            if self._part.loop and self.sent:
+                self._begin()
+            else:
+                self.playing, self.done = False, True
+                self._joints.wait_for_all_acked(Duration(seconds=1))
+
+    def _publish(self, message: Message) -> None:
+        sec, nanosec = struct.unpack_from('<iI' if message.data[1] & 1 else '>iI', message.data, 4)
+        stamp_ns = sec * SECOND + nanosec
+        if not 0 <= stamp_ns - self._told_ns < CLOCK_NS:  # the clock first: no sample lies far in the future
+            self._told_ns = stamp_ns
+            self._clock.publish(Clock(clock=Time(sec=sec, nanosec=nanosec)))
+        if self._names:
+            joints = deserialize_message(message.data, JointState)
+            joints.name = [self._names.get(name, name) for name in joints.name]
+            self._joints.publish(joints)
+        else:
+            self._joints.publish(message.data)
+        self.sent += 1

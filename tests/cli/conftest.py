@@ -1,0 +1,33 @@
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent.parent
+sys.path.insert(0, str(ROOT / 'tests' / 'ros'))
+
+from bench import Bench  # noqa: E402
+
+STIFF = '/**:\n  ros__parameters:\n    k: 60\n    rate: 200\n'
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    bench = Bench(tmp_path)
+    yield bench
+    bench.close()
+
+
+@pytest.fixture(scope='session')
+def live_trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a trial that was run live: 200 Hz, in step within its 5 s."""
+    folder = tmp_path_factory.mktemp('trial')
+    (folder / 'rig.yaml').write_text(STIFF)
+    subprocess.run(
+        [sys.executable, '-m', 'dcdrw.cli', 'trial', '--rig', 'rig.yaml', '--initial-phase', '35', '--seconds', '5',
+         '--note', 'first: "with" new springs', '--quiet', '--out', 'out'],
+        cwd=folder, env={**os.environ, 'PYTHONPATH': str(ROOT)}, check=True, timeout=120, stdout=subprocess.DEVNULL)
+    return folder / 'out'
