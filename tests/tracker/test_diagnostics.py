@@ -56,6 +56,13 @@ def test_nothing_known_reads_as_unknown() -> None:
     assert all('nan' not in value and 'inf' not in value for value in values.values())
 
 
+def test_keys_stay_and_keep_their_order() -> None:
+    estimator = PhaseEstimator(PhaseParams()).status()
+    later = estimator._replace(accepted=9, front_steps=3, refusal='outlier', n_uncertain=True)
+    assert list(diagnose_sync(SyncStatus(), NEVER, 1.0).values) == list(diagnose_sync(STATUS, 0.1, 1.0).values)
+    assert list(diagnose_phase(estimator, NEVER, 1.0).values) == list(diagnose_phase(later, 0.1, 1.0).values)
+
+
 def test_half_a_step_is_a_quarter_of_a_stride() -> None:
     assert phase_text(0.5) == '50.0 % of a step, 25.0 % of a stride'
 

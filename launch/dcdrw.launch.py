@@ -1,0 +1,102 @@
+"""The suite around any source of joint states: `ros2 launch dcdrw dcdrw.launch.py source:=sim rviz:=true`."""
+
+from pathlib import Path
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.substitutions import ExecutableInPackage, FindPackageShare
+
+from dcdrw.parameter_file import TrialParams, read_parameter_file
+from dcdrw.urdf import make_urdf
+
+SOURCES = ('sim', 'rig', 'recording')
+SWITCH = ('true', 'false')
+ARGUMENTS = {
+    'source': ('sim', 'sim: the simulator; rig: a camera and the tag tracker; recording: replayed', SOURCES),
+    'recording': ('', 'the recording to replay', None),
+    'camera': ('', 'rig: a camera (0, /dev/video0, rtsp://…) or a video file that the tag tracker opens itself '
+                   '(default: the topic image_raw)', None),
+    'calibration': ('', 'rig: a camera_info file, which `camera` needs (default: the topic camera_info)', None),
+    'params_file': ('', 'a parameter file for all nodes, as share/dcdrw/config/rig.yaml', None),
+    'namespace': ('', 'of all nodes', None),
+    'initial_phase_percent': ('', 'sim: phase at the start, percent of a step', None),
+    'real_time_factor': ('', 'sim, recording: seconds of the rig per second; sim: 0 is as fast as possible, and '
+                             'it implies simulated_time', None),
+    'simulated_time': ('false', 'sim: the simulator publishes /clock, and the other nodes follow it; a recording '
+                                'always does', SWITCH),
+    'record': ('false', 'record all topics of the suite', SWITCH),
+    'folder': ('', 'of what is recorded (default: recordings/DATE-TIME)', None),
+    'live': ('false', 'serve the page of `dcdrw live`; its button starts the recorder', SWITCH),
+    'markers': ('false', 'draw the rig for RViz and Foxglove; rviz implies it', SWITCH),
+    'rviz': ('false', 'show the rig in RViz, with its URDF in robot_state_publisher (needs both packages)', SWITCH),
+}
+
+
+def _actions(context):
+    chosen = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
+    on = {name: chosen[name] == 'true' for name, (_, _, choices) in ARGUMENTS.items() if choices is SWITCH}
+    source, pace = chosen['source'], chosen['real_time_factor']
+    if source == 'recording' and not chosen['recording']:
+        raise ValueError('source:=recording needs recording:=FOLDER')
+    simulated = source == 'recording' or (source == 'sim' and (on['simulated_time'] or bool(pace)))
+
+    def node(name, **parameters):
+        file = [chosen['params_file']] if chosen['params_file'] else []
+        return Node(package='dcdrw', executable=name, name=name, namespace=chosen['namespace'], output='screen',
+                    parameters=[*file, {'use_sim_time': simulated, **parameters}])
+
+    def texts(**arguments):
+        """Parameters from the arguments that are given; a text stays one, were it a number."""
+        return {name: ParameterValue(chosen[argument], value_type=str)
+                for name, argument in arguments.items() if chosen[argument]}
+
+    def command(name, *arguments):
+        namespace = ['--namespace', chosen['namespace']] if chosen['namespace'] else []
+        return ExecuteProcess(cmd=[ExecutableInPackage('dcdrw', 'dcdrw'), name, *arguments, *namespace],
+                              output='screen')
+
+    # First what may not be installed: a launch that fails must not leave nodes behind.
+    actions = _rviz(chosen, simulated) if on['rviz'] else []
+    actions += [node('sync_monitor'), node('phase_estimator')]
+    if on['record'] or on['live']:
+        actions.append(node('recorder', record=on['record'], **texts(folder='folder')))
+    if on['markers'] or on['rviz']:
+        actions.append(node('rig_markers'))
+    if on['live']:
+        actions.append(command('live', *(['--rig', chosen['params_file']] if chosen['params_file'] else [])))
+    if source == 'rig':
+        actions.append(node('tag_tracker', **texts(source='camera', camera='calibration')))
+    elif source == 'recording':
+        actions.append(command('replay', chosen['recording'], *(['--rate', pace] if pace else [])))
+    else:
+        numbers = {name: float(chosen[name]) for name in ('initial_phase_percent', 'real_time_factor') if chosen[name]}
+        actions.append(node('simulator', use_sim_time=False, publish_clock=simulated, **numbers))
+    return actions
+
+
+def _rviz(chosen, simulated):
+    """RViz, and the URDF's transforms. Only the simulator is sure to tell the coupler's length."""
+    namespace, rig = chosen['namespace'], TrialParams()
+    if chosen['params_file']:
+        rig = read_parameter_file(Path(chosen['params_file']), rig)
+    urdf = make_urdf(rig, fixed_coupler=chosen['source'] != 'sim')
+    config = PathJoinSubstitution([FindPackageShare('dcdrw'), 'rviz', 'dcdrw.rviz'])
+    return [
+        Node(package='robot_state_publisher', executable='robot_state_publisher', namespace=namespace, output='screen',
+             parameters=[{'robot_description': ParameterValue(urdf, value_type=str), 'use_sim_time': simulated}]),
+        Node(package='rviz2', executable='rviz2', namespace=namespace, arguments=['-d', config], output='screen',
+             parameters=[{'use_sim_time': simulated}],
+             remappings=[(f'/{topic}', topic) for topic in ('rig_markers', 'robot_description', 'debug_image')]),
+    ]
+
+
+def generate_launch_description():
+    """Estimator and monitor, the source that is asked for, and the tools that are switched on."""
+    return LaunchDescription([
+        *(DeclareLaunchArgument(name, default_value=default, description=doc, choices=choices)
+          for name, (default, doc, choices) in ARGUMENTS.items()),
+        OpaqueFunction(function=_actions),
+    ])

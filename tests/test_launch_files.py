@@ -1,0 +1,85 @@
+"""Launch files start what there is. What they make of their arguments is seen where ROS's launch is installed."""
+
+import ast
+import runpy
+from pathlib import Path
+
+import pytest
+
+from dcdrw import cli
+from dcdrw.executables import EXECUTABLES, TRIAL
+
+ROOT = Path(__file__).parent.parent
+FILES = sorted((ROOT / 'launch').glob('*.launch.py'))
+COMPOSITION = ROOT / 'launch' / 'dcdrw.launch.py'
+NAMES = {node.name for node in EXECUTABLES}
+CORE = {'phase_estimator', 'sync_monitor'}
+
+
+def first_arguments(function: str) -> set[str]:
+    """The constants that the composition gives to a function first."""
+    return {call.args[0].value for call in ast.walk(ast.parse(COMPOSITION.read_text(encoding='utf-8')))
+            if isinstance(call, ast.Call) and getattr(call.func, 'id', '') == function
+            and call.args and isinstance(call.args[0], ast.Constant)}
+
+
+@pytest.mark.parametrize('file', FILES, ids=lambda file: file.name)
+def test_each_file_makes_a_description(file):
+    tree = ast.parse(file.read_text(encoding='utf-8'))
+    assert 'generate_launch_description' in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    assert ast.get_docstring(tree)
+
+
+def test_every_node_and_command_of_the_composition_exists(capsys):
+    assert first_arguments('node') <= NAMES
+    assert first_arguments('node') >= {node.name for node in TRIAL}
+    with pytest.raises(SystemExit):
+        cli.main(['--help'])
+    words = set(capsys.readouterr().out.split())
+    assert first_arguments('command') <= words
+
+
+@pytest.fixture
+def started():
+    launch = pytest.importorskip('launch')
+    launch_ros = pytest.importorskip('launch_ros')
+    module = runpy.run_path(str(COMPOSITION))
+
+    def start(**arguments: str) -> dict[str, list[str]]:
+        """What runs with these arguments: nodes by their executables, commands by their names."""
+        context = launch.LaunchContext()
+        context.launch_configurations.update({name: default for name, (default, *_) in module['ARGUMENTS'].items()})
+        context.launch_configurations.update(arguments)
+        actions = module['_actions'](context)
+        nodes = [action for action in actions if isinstance(action, launch_ros.actions.Node)]
+        return {'nodes': [node.node_executable for node in nodes],
+                'commands': [[launch.utilities.perform_substitutions(context, part) for part in action.cmd[1:]]
+                             for action in actions if action not in nodes]}
+
+    return start
+
+
+def test_simulation_is_what_runs_without_arguments(started):
+    running = started()
+    assert set(running['nodes']) == {node.name for node in TRIAL}
+    assert running['commands'] == []
+
+
+def test_switches_add_their_tools(started):
+    assert set(started(markers='true')['nodes']) == {*CORE, 'simulator', 'rig_markers'}
+    assert set(started(record='true')['nodes']) == {*CORE, 'simulator', 'recorder'}
+    watched = started(live='true', namespace='lab')
+    assert 'recorder' in watched['nodes']  # for the page's button
+    assert watched['commands'] == [['live', '--namespace', 'lab']]
+
+
+def test_a_recording_takes_the_place_of_the_simulator(started):
+    running = started(source='recording', recording='day/7', real_time_factor='2')
+    assert set(running['nodes']) == CORE
+    assert running['commands'] == [['replay', 'day/7', '--rate', '2']]
+    with pytest.raises(ValueError, match='needs recording:='):
+        started(source='recording')
+
+
+def test_a_rig_is_seen_by_the_tag_tracker(started):
+    assert set(started(source='rig', camera='0', calibration='lens.yaml')['nodes']) == {*CORE, 'tag_tracker'}
