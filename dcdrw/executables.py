@@ -2,24 +2,43 @@
 
 from typing import Any, NamedTuple
 
+from dcdrw.recorder import RecorderParams
+from dcdrw.rig_markers import MarkerParams
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.tagging import TagParams
 from dcdrw_msgs_py.topics import (
+    CAMERA_INFO,
     CLOCK,
     COUPLER_FORCE_COMMAND,
+    DEBUG_IMAGE,
     DIAGNOSTICS,
     FOOTFALLS,
+    FRONT_POSE,
+    IMAGE_COMPRESSED,
+    IMAGE_RAW,
     JOINT_STATES,
+    PARAMETER_EVENTS,
     PHASE_STATE,
     PHI,
+    REAR_POSE,
+    RIG_MARKERS,
     STEP_DIFFERENCE,
     SYNC_ERROR,
     SYNC_ERROR_PERCENT,
     SYNCHRONIZED,
+    TAG_DETECTIONS,
     Topic,
 )
+from dcdrw_sim.render import LookParams
+from dcdrw_sim.scene import SceneParams, ViewParams
+from dcdrw_sim.shutter import ShutterParams
 from dcdrw_sim.simulator import SimulatorParams
 from dcdrw_tracker.phase import PhaseParams
+from dcdrw_tracker.poses import PoseParams
 from dcdrw_tracker.sync import SyncParams
+from dcdrw_tracker.tracker_source import SourceParams
+from dcdrw_tracker.wheel_track import TrackParams
+from dcdrw_tracker.wheel_view import PairViewParams
 
 
 class Executable(NamedTuple):
@@ -32,6 +51,8 @@ class Executable(NamedTuple):
     subscribes: tuple[Topic, ...]
     publishes: tuple[Topic, ...]
     services: tuple[str, ...] = ()
+    by_choice: tuple[Topic, ...] = ()
+    """Of the topics, those that only other parameters than the default ones bring."""
 
 
 SIMULATOR = Executable(
@@ -45,4 +66,29 @@ SYNC_MONITOR = Executable(
     'sync_monitor', 'dcdrw_tracker.sync_monitor_node', 'how far from walking in step, and whether it stays there',
     (SyncParams,), (PHASE_STATE,), (SYNC_ERROR, SYNC_ERROR_PERCENT, SYNCHRONIZED, DIAGNOSTICS))
 
-EXECUTABLES = (SIMULATOR, PHASE_ESTIMATOR, SYNC_MONITOR)
+MARKERS = Executable(
+    'rig_markers', 'dcdrw.rig_markers_node', 'the rig as markers, for RViz and Foxglove',
+    (MarkerParams,), (JOINT_STATES, DIAGNOSTICS), (RIG_MARKERS, DIAGNOSTICS))
+
+RECORDER = Executable(
+    'recorder', 'dcdrw.recorder_node', 'while it records: every topic of the suite, images aside, into a recording',
+    (RecorderParams,), (), (DIAGNOSTICS,), ('~/record (std_srvs/srv/SetBool)',))
+
+VIRTUAL_CAMERA = Executable(
+    'virtual_camera', 'dcdrw_sim.virtual_camera_node', 'pictures of the rig, as a camera on its left would take them',
+    (SceneParams, ViewParams, LookParams, TagParams, ShutterParams), (JOINT_STATES,),
+    (IMAGE_RAW, CAMERA_INFO, DIAGNOSTICS))
+
+TAG_TRACKER = Executable(
+    'tag_tracker', 'dcdrw_tracker.tag_tracker_node', "from a camera's pictures, or motion capture, to wheel rotations",
+    (TagParams, PairViewParams, TrackParams, PoseParams, SourceParams),
+    (IMAGE_RAW, IMAGE_COMPRESSED, CAMERA_INFO, FRONT_POSE, REAR_POSE),
+    (JOINT_STATES, TAG_DETECTIONS, DEBUG_IMAGE, DIAGNOSTICS), by_choice=(IMAGE_COMPRESSED, FRONT_POSE, REAR_POSE))
+
+TRIAL = (SIMULATOR, PHASE_ESTIMATOR, SYNC_MONITOR)
+"""The nodes of a trial in simulation."""
+EXECUTABLES = (*TRIAL, TAG_TRACKER, VIRTUAL_CAMERA, MARKERS, RECORDER)
+
+RECORDED = (*dict.fromkeys(topic for node in EXECUTABLES for topic in (*node.subscribes, *node.publishes)
+                           if not topic.type.endswith('Image')), PARAMETER_EVENTS)
+"""The topics that a recorder keeps."""

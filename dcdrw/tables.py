@@ -67,6 +67,8 @@ def _parameter(field: Field) -> tuple[str, ...]:
     quantity, default = field.quantity, field.default
     if isinstance(default, float):
         shown = quantity.derived if math.isnan(default) else f'{default:.6g}'
+    elif isinstance(default, tuple):
+        shown = f'`{list(default)}`'
     else:
         shown = f'`{default}`' if isinstance(default, str) else str(default).lower()
     live = 'changes' if quantity.live else 'fixed'

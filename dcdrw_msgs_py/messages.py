@@ -11,7 +11,7 @@ from geometry_msgs.msg import PointStamped
 from sensor_msgs.msg import JointState
 
 from dcdrw_msgs_py.diagnosis import Diagnosis
-from dcdrw_msgs_py.samples import CouplerSample, Footfall, JointSample, PhaseSample, Turn
+from dcdrw_msgs_py.samples import RUN, CouplerSample, Footfall, JointSample, PhaseSample, Turn, run_of
 from dcdrw_msgs_py.topics import (
     COUPLER,
     FRONT_STANCE,
@@ -24,8 +24,8 @@ from dcdrw_msgs_py.topics import (
 
 SECOND = 1_000_000_000
 
-# The frame of phase_state tells runs apart: the counts start afresh when the source starts anew.
-_RUN = 'run_'
+# Foxglove and PlotJuggler group diagnostics by their hardware's name.
+SUITE = 'dcdrw'
 
 
 def stamp_ns(stamp: Any) -> int:
@@ -97,7 +97,8 @@ class JointSampleReader:
 
         """
         front, rear, coupler = self._joints.read(message)
-        return JointSample(stamp_ns(message.header.stamp), Turn(*front[:2]), Turn(*rear[:2]), CouplerSample(*coupler))
+        return JointSample(stamp_ns(message.header.stamp), Turn(*front[:2]), Turn(*rear[:2]), CouplerSample(*coupler),
+                           run_of(message.header.frame_id))
 
 
 class PhaseSampleReader:
@@ -118,12 +119,7 @@ class PhaseSampleReader:
             raise ValueError(f'{STEP_DIFFERENCE_JOINT} must be a number, got {difference}')
         return PhaseSample(
             stamp_ns(message.header.stamp), Turn(*front[:2]), Turn(*rear[:2]), Turn(*phi[:2]), round(difference),
-            _restarts(message.header.frame_id))
-
-
-def _restarts(frame_id: str) -> int:
-    number = frame_id.removeprefix(_RUN)
-    return int(number) if number.isdecimal() else 0
+            run_of(message.header.frame_id))
 
 
 class JointSampleWriter:
@@ -136,6 +132,7 @@ class JointSampleWriter:
         """The message of a sample; valid until the next call."""
         message, (length, rate, force) = self._message, sample.coupler
         message.header.stamp = to_stamp(sample.stamp_ns)
+        message.header.frame_id = f'{RUN}{sample.run}' if sample.run else ''
         message.position = array('d', (sample.front.angle, sample.rear.angle, length))
         message.velocity = array('d', (sample.front.rate, sample.rear.rate, rate))
         message.effort = array('d', (math.nan, math.nan, force))
@@ -152,7 +149,7 @@ class PhaseSampleWriter:
         """The message of a sample; valid until the next call."""
         message, (_, front, rear, phi, difference, restarts) = self._message, sample
         message.header.stamp = to_stamp(sample.stamp_ns)
-        message.header.frame_id = f'{_RUN}{restarts}'
+        message.header.frame_id = f'{RUN}{restarts}'
         message.position = array('d', (front.angle, rear.angle, phi.angle, difference))
         message.velocity = array('d', (front.rate, rear.rate, phi.rate, 0.0))
         return message
@@ -175,7 +172,8 @@ def footfall(message: Any) -> Footfall:
 def diagnostics_message(name: str, diagnosis: Diagnosis, now_ns: int) -> Any:
     """One node's diagnosis as `/diagnostics` carries it."""
     values = [KeyValue(key=key, value=value) for key, value in diagnosis.values.items()]
-    status = DiagnosticStatus(level=bytes([diagnosis.level]), name=name, message=diagnosis.message, values=values)
+    status = DiagnosticStatus(level=bytes([diagnosis.level]), name=name, message=diagnosis.message,
+                              hardware_id=SUITE, values=values)
     message = DiagnosticArray(status=[status])
     message.header.stamp = to_stamp(now_ns)
     return message

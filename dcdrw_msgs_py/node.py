@@ -101,9 +101,9 @@ def advertise(node: Node, topic: Topic) -> Any:
     return node.create_publisher(message_type(topic), topic.name, qos)
 
 
-def listen(node: Node, topic: Topic, callback: Callable[[Any], None]) -> Any:
+def listen(node: Node, topic: Topic, callback: Callable[[Any], None], depth: int = SAMPLE_DEPTH) -> Any:
     """Subscribe so that reliable and best-effort publishers both match; to a latched topic, as it is published."""
-    qos = QoSProfile(depth=max(topic.depth, SAMPLE_DEPTH), reliability=ReliabilityPolicy.BEST_EFFORT)
+    qos = QoSProfile(depth=max(topic.depth, depth), reliability=ReliabilityPolicy.BEST_EFFORT)
     if topic.latched:
         qos = QoSProfile(depth=topic.depth, reliability=ReliabilityPolicy.RELIABLE,
                          durability=DurabilityPolicy.TRANSIENT_LOCAL)

@@ -6,7 +6,7 @@ YAML files and the tables of the docs are all read from these declarations.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
@@ -52,7 +52,8 @@ class Field(NamedTuple):
     """One parameter of a set, by its dotted name."""
 
     name: str
-    kind: type
+    kind: Any
+    """`int`, `float`, `bool`, `str`, or `tuple[int, ...]` and the like: a list of any length."""
     default: Any
     quantity: Quantity
 
@@ -63,6 +64,12 @@ class Field(NamedTuple):
             ValueError: the value is of another type or out of bounds.
 
         """
+        if get_origin(self.kind) is tuple:
+            value = () if value is None else value  # ROS reads an empty list in YAML as nothing
+            if isinstance(value, str) or not isinstance(value, Iterable):
+                raise ValueError(f'{self.name} must be a list, got {value!r}')
+            one = self._replace(kind=get_args(self.kind)[0])
+            return tuple(one._replace(name=f'{self.name}[{i}]').coerce(item) for i, item in enumerate(value))
         if self.kind in (int, float) and isinstance(value, (int, float)) and not isinstance(value, bool):
             if not self.quantity.allows(_as_float(value)):
                 raise ValueError(f'{self.name} must be {self.requirement}, got {value!r}')

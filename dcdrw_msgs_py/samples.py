@@ -4,6 +4,14 @@ import math
 from typing import NamedTuple
 
 NAN = math.nan
+RUN = 'run_'
+"""The frame of joint_states and phase_state, with a number, tells runs apart: counts start afresh with each."""
+
+
+def run_of(frame: str) -> int:
+    """The run that a message's frame tells; 0 where it tells none."""
+    other, _, number = frame.partition(RUN)
+    return int(number) if number.isdecimal() and not other else 0
 
 
 class Turn(NamedTuple):
@@ -33,6 +41,19 @@ class JointSample(NamedTuple):
     front: Turn
     rear: Turn
     coupler: CouplerSample = CouplerSample()
+    run: int = 0
+    """Within a run the source vouches that ψ is unbounded and lost no turn, through any gap; a new run has a larger
+    number. 0: the source does not say."""
+
+
+class PoseSample(NamedTuple):
+    """Where another tracker, as a motion capture system, sees one wheel: its hub and its body's frame, z up."""
+
+    stamp_ns: int
+    position: tuple[float, float, float]
+    """[m]"""
+    orientation: tuple[float, float, float, float]
+    """Unit quaternion x, y, z, w."""
 
 
 class PhaseSample(NamedTuple):

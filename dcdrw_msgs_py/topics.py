@@ -32,8 +32,21 @@ FOOTFALLS = Topic('footfalls', 'geometry_msgs/msg/PointStamped',
 SYNC_ERROR = Topic('sync_error', 'std_msgs/msg/Float64', 'e, rad', SAMPLE_DEPTH)
 SYNC_ERROR_PERCENT = Topic('sync_error_percent', 'std_msgs/msg/Float64', 'e, percent of a step', SAMPLE_DEPTH)
 SYNCHRONIZED = Topic('synchronized', 'std_msgs/msg/Bool', 'whether the pair walks in step', 1, latched=True)
+RIG_MARKERS = Topic('rig_markers', 'visualization_msgs/msg/MarkerArray', 'the rig, drawn, at most 30 Hz')
+IMAGE_RAW = Topic('image_raw', 'sensor_msgs/msg/Image', 'the rig as a camera on its left sees it', 2)
+CAMERA_INFO = Topic('camera_info', 'sensor_msgs/msg/CameraInfo', 'lens and sensor of that camera', 2)
+IMAGE_COMPRESSED = Topic('image_raw/compressed', 'sensor_msgs/msg/CompressedImage',
+                         'the same, as JPEG or PNG; follows the name of image_raw', 2)
+FRONT_POSE = Topic('front_pose', 'geometry_msgs/msg/PoseStamped',
+                   'front wheel as motion capture sees it: hub and turn, z up', SAMPLE_DEPTH)
+REAR_POSE = Topic('rear_pose', 'geometry_msgs/msg/PoseStamped', 'rear wheel, likewise', SAMPLE_DEPTH)
+TAG_DETECTIONS = Topic('tag_detections', 'visualization_msgs/msg/ImageMarker',
+                       'one per tag of a frame: ns the wheel, id the tag, points its corners in pixels', SAMPLE_DEPTH)
+DEBUG_IMAGE = Topic('debug_image', 'sensor_msgs/msg/Image',
+                    'tags, hubs, spokes and stance legs drawn over the picture, while somebody subscribes', 2)
 DIAGNOSTICS = Topic('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', 'health, 1 Hz')
 CLOCK = Topic('/clock', 'rosgraph_msgs/msg/Clock', 'simulated time, when asked')
+PARAMETER_EVENTS = Topic('/parameter_events', 'rcl_interfaces/msg/ParameterEvent', 'changes of parameters', SAMPLE_DEPTH)
 
 # Names of the joints in joint_states and phase_state.
 FRONT_WHEEL, REAR_WHEEL, COUPLER = 'front_wheel', 'rear_wheel', 'coupler'

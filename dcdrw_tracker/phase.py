@@ -21,6 +21,8 @@ lies ahead of the clock, or no wheel turns that fast."""
 LARGEST_ROTATION = 1e9
 """Beyond this a rotation is no measurement, and a double no longer tells a strike [rad]."""
 
+MaxSpeed = Annotated[float, Quantity('the fastest a wheel can turn; more is an outlier', 'rad/s', above=0.0, live=True)]
+
 
 class PhaseParams(NamedTuple):
     """What the estimator must know of the rig, and how much noise it bears."""
@@ -32,9 +34,7 @@ class PhaseParams(NamedTuple):
         float,
         Quantity('a strike counts back only when ψ recedes by more than this', 'deg', low=0.0, high=10.0, live=True),
     ] = 1.5
-    max_speed: Annotated[
-        float, Quantity('the fastest a wheel can turn; more is an outlier', 'rad/s', above=0.0, live=True)
-    ] = 20.0
+    max_speed: MaxSpeed = 20.0
     max_future: Annotated[
         float, Quantity('a stamp further ahead of the clock is refused', 's', low=0.0, live=True)
     ] = 0.5
@@ -76,7 +76,8 @@ class PhaseEstimator:
 
     A sample that no wheel can have made is refused. When `restart_samples` of them in a row agree with each other
     (a recording that loops, a simulator that was reset), the source has started anew: the estimator then counts
-    from the first of these, so no strike is lost.
+    from the first of these, so no strike is lost. A source that numbers its runs says itself when it starts anew, and
+    that no turn is lost in between.
     """
 
     def __init__(self, params: PhaseParams) -> None:
@@ -123,6 +124,8 @@ class PhaseEstimator:
         last = self._last
         if last is None:
             return self._start(joints)
+        if joints.run != last.run:
+            return self._restart([joints])
         elapsed_ns = joints.stamp_ns - last.stamp_ns
         if elapsed_ns > 0:
             # While outliers are held, a sample that could go on from either belongs to the nearer.
@@ -154,7 +157,7 @@ class PhaseEstimator:
         )
 
     def _start(self, joints: JointSample) -> PhaseUpdate:
-        stamp_ns, front, rear, _ = joints
+        stamp_ns, front, rear = joints[:3]
         self._front = Rotation(self.params.front.alpha, stamp_ns, front.angle, self._speed(front), self._tolerance)
         self._rear = Rotation(self.params.rear.alpha, stamp_ns, rear.angle, self._speed(rear), self._tolerance)
         return PhaseUpdate(self._take(joints), ())
@@ -166,9 +169,9 @@ class PhaseEstimator:
         rear_psi = rear.continued(joints.rear.angle, dt, tolerance)
         if front_psi is None or rear_psi is None:
             return None
-        if front.may_step(dt) or rear.may_step(dt):
+        stamp_ns, front_raw, rear_raw, _, run = joints
+        if not run and (front.may_step(dt) or rear.may_step(dt)):
             self._n_uncertain = True
-        stamp_ns, front_raw, rear_raw, _ = joints
         front_strikes = front.advance(stamp_ns, front_raw.angle, front_psi, self._speed(front_raw), tolerance)
         rear_strikes = rear.advance(stamp_ns, rear_raw.angle, rear_psi, self._speed(rear_raw), tolerance)
         footfalls = self._footfalls(front_strikes, rear_strikes) if front_strikes or rear_strikes else ()

@@ -46,15 +46,20 @@ class Rotation:
         """ψ̇ [rad/s]; NaN where it is not known yet."""
         self.pace = 0.0 if math.isnan(rate) else rate
         """Mean speed of the last second [rad/s]."""
+        self.speed = abs(self.pace)
+        """The fastest that the wheel has turned of late [rad/s]."""
+        self._highest = math.nextafter(alpha, 0.0)
         self._stamp_ns = stamp_ns
         self._raw = angle
         self._turns = 0
         self._wraps: bool | None = False if abs(angle) > math.tau + self.pitch else None
         self._past = deque([(stamp_ns, angle)])
         self._cell = self._first_cell = math.floor((angle + alpha + 0.5 * tolerance.hysteresis) / self.pitch)
-        low, high = self._boundaries()
-        self._backward_at = low - tolerance.hysteresis if angle < low + tolerance.hysteresis else low
-        self._forward_at = high
+        self._low, self._high = self._boundaries()
+        self._backward_at = self._low
+        if angle < self._low + tolerance.hysteresis:
+            self._backward_at -= tolerance.hysteresis
+        self._forward_at = self._high
 
     @property
     def steps(self) -> int:
@@ -64,12 +69,10 @@ class Rotation:
     @property
     def theta(self) -> float:
         """θ_i, consistent with n_i, in [−α, α) [rad]."""
-        return min(max(self.psi - self._cell * self.pitch, -self.alpha), math.nextafter(self.alpha, 0.0))
-
-    @property
-    def speed(self) -> float:
-        """The fastest that the wheel has turned of late [rad/s]."""
-        return max(abs(self.pace), abs(self.rate)) if math.isfinite(self.rate) else abs(self.pace)
+        theta = self.psi - self._cell * self.pitch
+        if -self.alpha <= theta < self.alpha:
+            return theta
+        return -self.alpha if theta < 0.0 else self._highest
 
     def may_step(self, dt: float) -> bool:
         """Whether the wheel may take a whole step in this time [s]."""
@@ -84,8 +87,10 @@ class Rotation:
         known to wrap is taken to have kept its pace. So an unbounded rotation stays what it is, through any gap.
         """
         moved = angle - self._raw
-        fastest = tolerance.max_speed * dt
         slack = 2.0 * tolerance.hysteresis
+        if not self._wraps and -slack <= moved <= slack:  # in reach of any wheel: the rule, at a fast rate
+            return angle + math.tau * self._turns
+        fastest = tolerance.max_speed * dt
         along = min(fastest, 2.0 * self.speed * dt + self.pitch) + slack
         against = min(fastest, self.pitch) + slack
         low, high = (-against, along) if self.pace >= 0.0 else (-along, against)
@@ -106,28 +111,27 @@ class Rotation:
             self._wraps = False
         strikes = self._strikes(elapsed_ns, psi, tolerance.hysteresis)
         self.rate = self._slope(stamp_ns, psi, moved / dt, strikes) if math.isnan(rate) else rate
-        self.pace += (moved - self.pace * dt) / max(dt, PACE_MEMORY)
+        self.pace += (moved - self.pace * dt) / (dt if dt > PACE_MEMORY else PACE_MEMORY)
+        self.speed = max(abs(self.pace), abs(self.rate))  # the pace where the rate is NaN
         self.psi, self._raw, self._stamp_ns = psi, angle, stamp_ns
-        self._turns = round((psi - angle) / math.tau)
+        self._turns = round((psi - angle) / math.tau) if psi != angle else 0
         return strikes
 
     def _strikes(self, elapsed_ns: int, psi: float, hysteresis: float) -> list[Strike]:
         strikes: list[Strike] = []
         while not self._backward_at <= psi < self._forward_at:
-            low, high = self._boundaries()
             forward = psi >= self._forward_at
-            crossed = high if forward else low
+            crossed = self._high if forward else self._low
             self._cell += 1 if forward else -1
             share = min(max((crossed - self.psi) / (psi - self.psi), 0.0), 1.0)
             strikes.append(Strike(self._stamp_ns + round(share * elapsed_ns), self.steps))
-            low, high = self._boundaries()
-            self._backward_at = low - hysteresis if forward else low
-            self._forward_at = high if forward else high + hysteresis
-        low, high = self._boundaries()
-        if psi >= low + hysteresis:
-            self._backward_at = low
-        if psi <= high - hysteresis:
-            self._forward_at = high
+            self._low, self._high = self._boundaries()
+            self._backward_at = self._low - hysteresis if forward else self._low
+            self._forward_at = self._high if forward else self._high + hysteresis
+        if psi >= self._low + hysteresis:
+            self._backward_at = self._low
+        if psi <= self._high - hysteresis:
+            self._forward_at = self._high
         return strikes
 
     def _boundaries(self) -> tuple[float, float]:

@@ -106,7 +106,8 @@ class SyncMonitor:
     def configure(self, params: SyncParams) -> None:
         """Take changed parameters at once."""
         self.params = params
-        self._pitch = params.front.alpha + params.rear.alpha
+        self._front_alpha, self._rear_alpha = params.front.alpha, params.rear.alpha
+        self._pitch = self._front_alpha + self._rear_alpha
 
     def reset(self) -> None:
         """Start afresh with the next sample."""
@@ -126,24 +127,26 @@ class SyncMonitor:
 
     def update(self, phase: PhaseSample) -> SyncSample | None:
         """Take the next sample; None where an angle is none, or where the stamp is that of the last sample."""
-        if not all(abs(turn.angle) <= math.pi for turn in (phase.front, phase.rear, phase.phi)):
+        stamp_ns, now_front, now_rear, phi, n, restarts = phase
+        if not (abs(now_front.angle) <= math.pi and abs(now_rear.angle) <= math.pi and abs(phi.angle) <= math.pi):
             return None
         last = self._last
         if last is None:
             return self._start(phase)
-        dt = (phase.stamp_ns - last.stamp_ns) * 1e-9
-        if dt == 0.0 and phase.restarts == last.restarts:
+        dt = (stamp_ns - last.stamp_ns) * 1e-9
+        if dt == 0.0 and restarts == last.restarts:
             return None
-        if phase.restarts != last.restarts or not 0.0 < dt <= self.params.stale_after:
+        if restarts != last.restarts or not 0.0 < dt <= self.params.stale_after:
             return self._restart(phase)
-        front = _advance(last.front, phase.front, dt, self.params.front.alpha)
-        rear = _advance(last.rear, phase.rear, dt, self.params.rear.alpha)
+        front = _advance(last.front, now_front, dt, self._front_alpha)
+        rear = _advance(last.rear, now_rear, dt, self._rear_alpha)
         if not _continuous(last, phase, front, rear):
             return self._restart(phase)
-        self._cadence.tick(phase.stamp_ns)
-        self._take_strikes(last, phase, front, rear)
-        self._take_step_difference(phase.step_difference)
-        self._take_error(last, phase, front.strikes)
+        self._cadence.tick(stamp_ns)
+        if front.strikes or rear.strikes:
+            self._take_strikes(last, phase, front, rear)
+        self._take_step_difference(n)
+        self._take_error(last, phase, front.strikes, dt)
         self._last = phase
         return self._sample(phase)
 
@@ -197,9 +200,8 @@ class SyncMonitor:
             self._struck_ns[FRONT] = phase.stamp_ns
             error = self._percent(last.phi.angle)
             change = math.remainder(self._percent(phase.phi.angle) - error, 100.0)
-            alpha = self.params.front.alpha
             for strike in range(front.strikes):
-                share = (alpha * (1 + 2 * strike) - last.front.angle) / (front.motion or 1.0)
+                share = (self._front_alpha * (1 + 2 * strike) - last.front.angle) / (front.motion or 1.0)
                 self._note(math.remainder(error + min(max(share, 0.0), 1.0) * change, 100.0))
         if rear.strikes > 0:
             self._struck_ns[REAR] = phase.stamp_ns
@@ -217,18 +219,22 @@ class SyncMonitor:
     def _take_step_difference(self, n: int) -> None:
         """n takes two neighbouring values in normal operation; where it leaves them, a wheel has slipped."""
         low, high = self._usual
+        if low <= n <= high and low < high:
+            return
         slips = max(n - 1 - low, high - 1 - n, 0)
         if slips:
             self._slips += slips
             self._slipped_at = self._steps
         self._usual = max(min(low, n), n - 1), min(max(high, n), n + 1)
 
-    def _take_error(self, last: PhaseSample, phase: PhaseSample, strikes: int) -> None:
+    def _take_error(self, last: PhaseSample, phase: PhaseSample, strikes: int, dt: float) -> None:
         """Latch after `hold_steps` strikes within ±band; unlatch beyond ±(band + hysteresis)."""
         params = self.params
         self._error = error = self._percent(phase.phi.angle)
-        self._swing = min(self._swing[0], error), max(self._swing[1], error)
-        self._smooth = self._smoothed(last, phase)
+        low, high = self._swing
+        if not low <= error <= high:
+            self._swing = min(low, error), max(high, error)
+        self._smooth = self._smoothed(last, phase, dt)
         first = self._steps + 1
         self._steps += strikes
         edge = params.band_percent + (params.band_hysteresis_percent if self._synchronized else 0.0)
@@ -244,9 +250,8 @@ class SyncMonitor:
                 self._synchronized, self._lost = False, True
                 self._losses += 1
 
-    def _smoothed(self, last: PhaseSample, phase: PhaseSample) -> float:
+    def _smoothed(self, last: PhaseSample, phase: PhaseSample, dt: float) -> float:
         """The error that its past and rate foretell, drawn towards the new one; the new one where they disagree."""
-        dt = (phase.stamp_ns - last.stamp_ns) * 1e-9
         rate = 50.0 * (last.phi.rate + phase.phi.rate) / self._pitch
         foretold = self._smooth + (rate * dt if abs(rate) <= 100.0 * FASTEST else 0.0)
         surprise = math.remainder(self._error - foretold, 100.0)

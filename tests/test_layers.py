@@ -15,7 +15,7 @@ ALLOWED = {
     'dcdrw_tracker': {'dcdrw_msgs_py'},
     'dcdrw': {'dcdrw_msgs_py', 'dcdrw_sim', 'dcdrw_tracker'},
 }
-KNOW_ROS = {'dcdrw_msgs_py.node', 'dcdrw_msgs_py.messages', 'dcdrw.observer'}
+KNOW_ROS = {'dcdrw_msgs_py.node', 'dcdrw_msgs_py.messages', 'dcdrw_msgs_py.image_messages', 'dcdrw.observer'}
 MODULES = [
     '.'.join(path.relative_to(ROOT).with_suffix('').parts)
     for package in PACKAGES for path in sorted((ROOT / package).glob('*.py')) if path.stem != '__init__']

@@ -31,7 +31,8 @@ def test_stamps_survive(stamp):
     assert stamp_ns(to_stamp(stamp)) == stamp
 
 
-@given(st.builds(JointSample, stamps, turns, turns, st.builds(CouplerSample, numbers, numbers, numbers)))
+@given(st.builds(JointSample, stamps, turns, turns, st.builds(CouplerSample, numbers, numbers, numbers),
+                 st.integers(0, 2**63)))
 def test_joint_samples_survive(sample):
     assert JointSampleReader().read(JointSampleWriter().write(sample)) == sample
 

@@ -1,4 +1,5 @@
 import math
+from array import array
 from typing import Annotated, NamedTuple
 
 import pytest
@@ -25,11 +26,14 @@ class Outer(NamedTuple):
     name: Annotated[str, Quantity('what')] = 'x'
     rest: Annotated[float, Quantity('free', 's', derived='from size', live=True)] = math.nan
     ratio: Annotated[float, Quantity('of both', low=-1.0, high=1.0)] = 0.5
+    ids: Annotated[tuple[int, ...], Quantity('of many', low=0)] = (0,)
+    sizes: Annotated[tuple[float, ...], Quantity('of many', 'm', above=0.0)] = ()
 
 
 inner = st.builds(Inner, st.floats(0.0, 1e9, exclude_min=True), st.integers(1, 9))
 outer = st.builds(Outer, inner, inner, st.booleans(), st.text(), st.floats(allow_nan=False, allow_infinity=False),
-                  st.floats(-1.0, 1.0))
+                  st.floats(-1.0, 1.0), st.lists(st.integers(0, 10**9)).map(tuple),
+                  st.lists(st.floats(1e-9, 1e9)).map(tuple))
 
 
 @given(outer)
@@ -41,7 +45,7 @@ def test_flatten_and_build_are_inverse(params):
 @given(st.dictionaries(st.sampled_from([field.name for field in fields(Outer)]), st.none()))
 def test_what_is_absent_takes_its_default(names):
     given_ = {name: value for name, value in flatten(Outer()).items() if name in names}
-    assert flatten(build(Outer, given_)) == pytest.approx(flatten(Outer()), nan_ok=True)
+    assert repr(build(Outer, given_)) == repr(Outer())  # NaN is not equal to itself
 
 
 def test_fields_come_flat_in_the_order_of_declaration_with_the_defaults_of_their_group():
@@ -60,7 +64,26 @@ def test_whole_numbers_serve_as_numbers_and_whole_floats_as_whole_numbers():
     assert (params.right.count, type(params.right.count)) == (4, int)
 
 
+@pytest.mark.parametrize('ids', [[3, 4.0], (3, 4), array('q', [3, 4]), array('d', [3, 4])])
+def test_a_list_may_come_as_any_sequence_of_numbers(ids):
+    params = build(Outer, {'ids': ids, 'sizes': ids})
+    assert params.ids == (3, 4)
+    assert [type(value) for value in params.ids + params.sizes] == [int, int, float, float]
+
+
+@pytest.mark.parametrize('nothing', [[], (), None])
+def test_a_list_may_be_empty(nothing):
+    assert build(Outer, {'ids': nothing}).ids == ()
+
+
 @pytest.mark.parametrize(('values', 'message'), [
+    ({'ids': 3}, 'ids must be a list, got 3'),
+    ({'ids': '34'}, "ids must be a list, got '34'"),
+    ({'ids': [3, -1]}, r'ids\[1\] must be ≥ 0, got -1'),
+    ({'ids': [3, 0.5]}, r'ids\[1\] must be a whole number, got 0\.5'),
+    ({'ids': [True]}, r'ids\[0\] must be a whole number, got True'),
+    ({'sizes': [1.0, 'x']}, r"sizes\[1\] must be a number, got 'x'"),
+    ({'sizes': [0.0]}, r'sizes\[0\] must be > 0 m, got 0'),
     ({'left.size': 0}, r'left\.size must be > 0 m, got 0'),
     ({'left.size': 'large'}, r"left\.size must be a number, got 'large'"),
     ({'left.size': True}, r'left\.size must be a number, got True'),

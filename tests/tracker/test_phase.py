@@ -251,6 +251,29 @@ def test_a_restart_of_the_source_counts_afresh_and_loses_no_strike(pause_ns: int
     assert not status.n_uncertain
 
 
+def test_a_new_run_of_the_source_counts_afresh_at_once() -> None:
+    """Even where the wheels could have got there: the source knows that it lost them."""
+    samples = walk(6.0).samples()
+    marked = [sample._replace(run=7 if index < 600 else 9) for index, sample in enumerate(samples)]
+    phases, falls, status = run(marked)
+    alone, falls_alone, _ = run(marked[600:])
+    assert [phase.restarts for phase in phases] == [0] * 600 + [1] * 600
+    assert same(phases[600:], alone)
+    assert falls[-len(falls_alone):] == falls_alone
+    assert (status.restarts, status.accepted) == (1, len(samples))
+    assert phases[600].step_difference == 0
+
+
+def test_within_a_run_no_gap_makes_n_uncertain() -> None:
+    truth = walk(20.0, 100.0)
+    samples = [sample._replace(run=1) for sample in truth.samples()]
+    phases, _, status = run(samples[:300] + samples[800:])
+    n1, n2 = truth.steps()
+    assert phases[-1].step_difference == n1[-1] - n2[-1]
+    assert not status.n_uncertain
+    assert status.cadence.gaps == 1
+
+
 def test_a_reset_begins_with_the_next_sample() -> None:
     estimator = PhaseEstimator(PhaseParams())
     samples = walk(3.0).samples()
