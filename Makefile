@@ -4,10 +4,10 @@ PYTHON ?= python3
 ifdef ROS_DISTRO
 VENV := .venv-$(ROS_DISTRO)
 VENV_FLAGS := --system-site-packages
-EXTRAS := figures,speed,test,lint
+EXTRAS := figures,speed,record,live,sweep,test,lint
 else
 VENV := .venv
-EXTRAS := ros,figures,speed,test,lint
+EXTRAS := ros,figures,speed,camera,record,live,sweep,test,lint
 # The wheels' loader marks its environment; another environment's mark must not reach ours.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 endif
@@ -33,8 +33,7 @@ lint: $(READY)
 	@$(BIN)/mypy
 
 bench: $(READY)
-	@$(BIN)/python benchmarks/trajectories.py
-	@$(BIN)/python benchmarks/pipeline.py
+	@for table in benchmarks/*.py; do echo; echo "$$table"; $(BIN)/python $$table || exit; done
 
 $(READY): setup.cfg setup.py
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; (3, 10) <= v <= (3, 13) or sys.exit(f"python3 is {v[0]}.{v[1]}; rclpy needs 3.10 to 3.13: make PYTHON=python3.12 ...")'

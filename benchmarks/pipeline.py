@@ -28,7 +28,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Int32
 
-from dcdrw.executables import EXECUTABLES
+from dcdrw.executables import TRIAL
 from dcdrw.processes import free_domain
 from dcdrw_msgs_py.messages import SECOND, JointSampleReader, JointSampleWriter, PhaseSampleWriter, stamp_ns
 from dcdrw_msgs_py.node import advertise, listen, make_executor, run, steady_clock
@@ -38,7 +38,7 @@ from dcdrw_tracker.phase import PhaseEstimator, PhaseParams
 from dcdrw_tracker.sync import SyncMonitor, SyncParams
 
 WARM_UP = 3.0
-SUITE = [node.module for node in reversed(EXECUTABLES)]
+SUITE = [node.module for node in reversed(TRIAL)]
 ROLES = ('monitor', 'estimator', 'source')
 
 

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from dcdrw.joint_batch import JointBatch
 from dcdrw.parameter_file import TrialParams
-from dcdrw_msgs_py.samples import CouplerSample, Footfall, JointSample, PhaseSample, Turn, run_of
+from dcdrw_msgs_py.samples import SECOND, CouplerSample, Footfall, JointSample, PhaseSample, Turn, run_of
 from dcdrw_tracker.phase import PhaseEstimator, PhaseStatus
 from dcdrw_tracker.sync import SyncMonitor, SyncStatus
 
-SECOND = 1e9
+HELD = 0.1
+"""A wheel that turns slower may be held, seen through the noise of a camera [rad/s]."""
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -87,13 +88,18 @@ class Analysis(NamedTuple):
 def analyze(batches: Iterable[JointBatch], params: TrialParams) -> Analysis:
     """Run estimator and monitor over the joint states of a trial.
 
-    The monitor starts afresh when the wheels are let go: with the last sample before a wheel has a speed.
+    The monitor starts afresh when the wheels are let go: with the last sample before a wheel moves.
     """
     trial = _Trial(params)
     with _no_collections():
         for batch in batches:
             trial.take(batch)
     return trial.result()
+
+
+def moves(phase: PhaseSample) -> bool:
+    """Whether a wheel moves; one of unknown speed does."""
+    return not (abs(phase.front.rate) <= HELD and abs(phase.rear.rate) <= HELD)
 
 
 @contextmanager
@@ -163,7 +169,7 @@ class _Trial:
             if made is None:
                 continue
             phase, footfalls = made
-            if not self._moving and (phase.front.rate or phase.rear.rate):
+            if not self._moving and moves(phase):
                 self._let_go(row, len(taken))
             sync = self._monitor.update(phase)
             self._last = phase

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 LEAST_STEPS = 5
 """Fewer errors tell no decay."""
@@ -38,6 +37,8 @@ def fit_decay(errors: Sequence[float]) -> Decay:
 
     """
     count = len(errors)
+    from scipy.optimize import least_squares  # slow to import, and few commands need it
+
     steps, values = np.arange(count), np.array(errors, float)
     if count < LEAST_STEPS or np.ptp(values) < SMALLEST_CHANGE:
         return Decay()

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from dcdrw.analysis import SECOND, Analysis, Floats
+from dcdrw.analysis import Analysis, Floats
 from dcdrw_msgs_py.rig import FRONT, REAR
+from dcdrw_msgs_py.samples import SECOND
 
 # Okabe and Ito's palette: told apart by the colour-blind, and in grey by lightness.
 _COLOURS = {FRONT: '#0072B2', REAR: '#D55E00'}

@@ -17,7 +17,7 @@ from dcdrw_msgs_py.camera import write_camera
 from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.quantity import Field, Params, build, check, fields, flatten
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelShape
-from dcdrw_msgs_py.samples import CouplerSample, JointSample, Turn
+from dcdrw_msgs_py.samples import SECOND, CouplerSample, JointSample, Turn
 from dcdrw_msgs_py.tagging import TagParams
 from dcdrw_sim.presets import PRESETS
 from dcdrw_sim.render import LookParams, Renderer
@@ -25,7 +25,6 @@ from dcdrw_sim.scene import Footing, SceneParams, ViewParams
 from dcdrw_sim.simulation import Motion, MotionError, Simulation
 from dcdrw_sim.simulator import SimulatorParams
 
-SECOND = 1_000_000_000
 CODECS = {'.mp4': 'mp4v', '.avi': 'MJPG', '.mkv': 'FFV1'}
 TRUTH = ('stamp_ns', 'psi1', 'omega1', 'psi2', 'omega2', 'phi', 'n')
 STRIKES = ('wheel', 'stamp_ns', 'x', 'steps')

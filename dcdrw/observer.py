@@ -6,6 +6,7 @@ from typing import Any
 
 from rclpy.node import Node
 
+from dcdrw.analysis import moves
 from dcdrw_msgs_py.diagnosis import Diagnosis, Level
 from dcdrw_msgs_py.messages import PhaseSampleReader, footfall
 from dcdrw_msgs_py.node import Age, listen
@@ -59,7 +60,7 @@ class Observer(Node):
         phase = self._reader.read(message)
         self.age.renew()
         if not self.moving:
-            self.moving = bool(phase.front.rate or phase.rear.rate)
+            self.moving = moves(phase)
             if self.moving:
                 self._first = self._last or phase
                 self.monitor.update(self._first)

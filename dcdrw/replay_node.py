@@ -13,8 +13,8 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from dcdrw.recording import Message, Recording
-from dcdrw_msgs_py.messages import SECOND
 from dcdrw_msgs_py.node import advertise, steady_clock
+from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.topics import CLOCK, JOINT_STATES
 
 TICK_SECONDS = 0.001

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from dcdrw.analysis import SECOND, Analysis
+from dcdrw.analysis import Analysis
 from dcdrw.analyze import SAMPLES_HEADER, read_trial
 from dcdrw.decay import Decay, fit_decay
 from dcdrw.recorder import INFORMATION, METADATA, PARAMETERS
@@ -19,6 +19,7 @@ from dcdrw.recording import find
 from dcdrw.report_page import page
 from dcdrw.summary import final_band, sentence
 from dcdrw_msgs_py.rig import FRONT
+from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.topics import JOINT_STATES
 
 SIMULATED, MEASURED = 'simulated', 'measured'

@@ -1,4 +1,7 @@
-"""`dcdrw trial`: simulator, phase estimator, monitor and recorder as processes, watched live, judged by the record."""
+"""`dcdrw trial`: simulator, phase estimator, monitor and recorder as processes, watched live, judged by the record.
+
+With `--camera`, virtual camera and tag tracker stand between the simulator and the others, which do not know.
+"""
 
 import argparse
 import math
@@ -15,13 +18,15 @@ from typing import Any
 from dcdrw.analysis import analyze
 from dcdrw.analyze import describe, read_trial, write_results
 from dcdrw.arguments import domain, number, positive
-from dcdrw.executables import RECORDER, TRIAL
+from dcdrw.executables import RECORDER, SIMULATOR, TAG_TRACKER, TRIAL, VIRTUAL_CAMERA, Executable
+from dcdrw.filmed_rig import FilmedRig, TruthError, filmed_rig, truth_error
 from dcdrw.parameter_file import TrialParams, add_rig_options, chosen_params, write_parameter_file
 from dcdrw.processes import NodeProcess, free_domain
 from dcdrw.recorder import RecorderParams, require_libraries
-from dcdrw.recording import RECORDING
+from dcdrw.recording import RECORDING, Recording
 from dcdrw.summary import sentence
 from dcdrw_msgs_py.diagnosis import Level
+from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.quantity import check
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.topics import FOOTFALLS, JOINT_STATES, PHASE_STATE, SYNC_ERROR
@@ -34,12 +39,17 @@ ASK_AGAIN_SECONDS = 2.0
 """A request that has brought nothing for so long is sent again [s]."""
 SILENCE_SECONDS = 3.0
 """Without data for this long, a trial has failed."""
+TRUTH = 'true_joint_states'
+"""What the simulator publishes in the place of joint_states where a camera films the rig."""
 
 _EPILOG = """\
 The nodes run on a free ROS domain that only this machine sees, unless --domain names one. DIR gets the
 recording (for ros2 bag, dcdrw replay and dcdrw analyze), summary.json, trial.png, samples.csv, footfalls.csv and what
 each node printed. Exit status: 0 the trial ran to its end (whether
 or not the pair fell into step: see the summary), 1 a node died or no data came, 2 wrong input, 130 interrupted.
+
+With --camera, joint_states come from pictures, as from a real rig: simulator, virtual_camera and tag_tracker run in a
+row. Where the camera stands and what its pictures are like are parameters of virtual_camera, in the file of --rig.
 """
 
 
@@ -60,6 +70,8 @@ def add_command(commands: Any) -> None:
     parser.add_argument('--initial-phase', type=number, metavar='PERCENT',
                         help='phase at the start, percent of a step (default: 21.6)')
     parser.add_argument('--seconds', type=positive, default=30.0, help='length of the trial (default: %(default)g)')
+    parser.add_argument('--camera', action='store_true',
+                        help='have the wheels tracked in the pictures of a virtual camera, and tell how well')
     parser.add_argument('--out', type=Path, metavar='DIR', help='where to write; must not exist, or be empty '
                         '(default: trials/DATE-TIME)')
     parser.add_argument('--domain', type=domain, metavar='N', help='ROS domain to use instead of a free one')
@@ -76,6 +88,8 @@ def trial(options: argparse.Namespace) -> int:
         raise ValueError("a trial needs rclpy: source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' "
                          'ros-jazzy-common-interfaces') from None
     require_libraries()
+    if options.camera:
+        opencv()
     params = chosen_params(options)
     if options.initial_phase is not None:
         params = params._replace(simulator=check(
@@ -88,10 +102,11 @@ def trial(options: argparse.Namespace) -> int:
     params = params._replace(phase=params.phase._replace(
         S0=start.S0 - start.front.step_length, front_joint=joints.front_joint, rear_joint=joints.rear_joint,
         coupler_joint=joints.coupler_joint))
+    filmed = filmed_rig(options, params) if options.camera else None
     folder = free_folder(options.out)
     folder.mkdir(parents=True, exist_ok=True)
     with nullcontext(options.domain) if options.domain is not None else free_domain() as chosen:
-        return _Trial(params, options, folder, chosen).run()
+        return _Trial(params, filmed, options, folder, chosen).run()
 
 
 def free_folder(chosen: Path | None) -> Path:
@@ -110,8 +125,10 @@ def free_folder(chosen: Path | None) -> Path:
 class _Trial:
     """One trial from start to summary."""
 
-    def __init__(self, params: TrialParams, options: argparse.Namespace, folder: Path, domain: int) -> None:
-        self.params, self.options, self.folder, self.domain = params, options, folder, domain
+    def __init__(self, params: TrialParams, filmed: FilmedRig | None, options: argparse.Namespace, folder: Path,
+                 domain: int) -> None:
+        self.params, self.filmed, self.options, self.folder, self.domain = params, filmed, options, folder, domain
+        self.executables: tuple[Executable, ...] = (*TRIAL, VIRTUAL_CAMERA, TAG_TRACKER) if filmed else TRIAL
         self.nodes: list[NodeProcess] = []
         self.interrupted = False
 
@@ -151,10 +168,12 @@ class _Trial:
     def _start_nodes(self, environment: dict[str, str]) -> None:
         file = self.folder / 'parameters.yaml'
         held = self.params.simulator._replace(paused=True)
-        recorder = RecorderParams(str(self.folder / RECORDING), self.options.note, record=True)
-        write_parameter_file((*self.params._replace(simulator=held), recorder), file)
-        for node in (RECORDER, *reversed(TRIAL)):  # who listens, first
-            self.nodes.append(NodeProcess(node.name, node.module, ['--ros-args', '--params-file', str(file)],
+        topics = f'{TRUTH}:{JOINT_STATES.type}' if self.filmed else ''
+        recorder = RecorderParams(str(self.folder / RECORDING), self.options.note, topics, record=True)
+        write_parameter_file((*self.params._replace(simulator=held), *(self.filmed or ()), recorder), file)
+        for node in (RECORDER, *reversed(self.executables)):  # who listens, first
+            apart = ['-r', f'{JOINT_STATES.name}:={TRUTH}'] if self.filmed and node in (SIMULATOR, VIRTUAL_CAMERA) else []
+            self.nodes.append(NodeProcess(node.name, node.module, ['--ros-args', '--params-file', str(file), *apart],
                                           environment, self.folder / f'{node.name}.log'))
         self._say('starting the nodes ...')
         self._spin_until(self._all_at_work, START_SECONDS, 'no data came through the nodes')
@@ -167,7 +186,7 @@ class _Trial:
         told = recorder.values
         return (all(int(told.get(f'messages of /{topic.name}', 0)) > 0 for topic in (JOINT_STATES, *needed))
                 and f'messages of /{FOOTFALLS.name}' in told
-                and all(node.name in told.get('parameters of', '') for node in TRIAL))
+                and all(node.name in told.get('parameters of', '') for node in self.executables))
 
     def _let_go(self) -> None:
         """Release the wheels, which were held until the whole chain was seen to work."""
@@ -243,15 +262,22 @@ class _Trial:
         if not self.options.quiet and sys.stdout.isatty():
             print()
         end = failure or ('interrupted' if self.interrupted else 'complete')
+        truth: TruthError | None = None
         try:
             trial, agreements = read_trial(self.folder / RECORDING, self.params)
+            if self.filmed:
+                with Recording(self.folder / RECORDING) as recording:
+                    truth = truth_error(trial, recording.joints(recording.find(TRUTH)))
         except (ValueError, OSError) as error:
             trial, agreements = analyze([], self.params), {}
             failure = failure or str(error)
         print(sentence(trial))
+        if truth:
+            print(truth)
         try:
             write_results(trial, self.folder, end=end, agreement=describe(agreements), diagnostics={
-                name: said.message for name, said in self.observer.diagnoses.items()})
+                name: said.message for name, said in self.observer.diagnoses.items()},
+                **({'truth': truth._asdict()} if truth else {}))
             print(f'Written: {self.folder}/')
         except ValueError as error:
             print(f'dcdrw trial: no picture: {error}', file=sys.stderr)

@@ -11,7 +11,7 @@ from geometry_msgs.msg import PointStamped
 from sensor_msgs.msg import JointState
 
 from dcdrw_msgs_py.diagnosis import Diagnosis
-from dcdrw_msgs_py.samples import RUN, CouplerSample, Footfall, JointSample, PhaseSample, Turn, run_of
+from dcdrw_msgs_py.samples import RUN, SECOND, CouplerSample, Footfall, JointSample, PhaseSample, Turn, run_of
 from dcdrw_msgs_py.topics import (
     COUPLER,
     FRONT_STANCE,
@@ -21,8 +21,6 @@ from dcdrw_msgs_py.topics import (
     REAR_WHEEL,
     STEP_DIFFERENCE_JOINT,
 )
-
-SECOND = 1_000_000_000
 
 # Foxglove and PlotJuggler group diagnostics by their hardware's name.
 SUITE = 'dcdrw'

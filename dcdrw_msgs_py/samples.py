@@ -4,6 +4,8 @@ import math
 from typing import NamedTuple
 
 NAN = math.nan
+SECOND = 1_000_000_000
+"""[ns]"""
 RUN = 'run_'
 """The frame of joint_states and phase_state, with a number, tells runs apart: counts start afresh with each."""
 

@@ -46,7 +46,8 @@ DEBUG_IMAGE = Topic('debug_image', 'sensor_msgs/msg/Image',
                     'tags, hubs, spokes and stance legs drawn over the picture, while somebody subscribes', 2)
 DIAGNOSTICS = Topic('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', 'health, 1 Hz')
 CLOCK = Topic('/clock', 'rosgraph_msgs/msg/Clock', 'simulated time, when asked')
-PARAMETER_EVENTS = Topic('/parameter_events', 'rcl_interfaces/msg/ParameterEvent', 'changes of parameters', SAMPLE_DEPTH)
+PARAMETER_EVENTS = Topic('/parameter_events', 'rcl_interfaces/msg/ParameterEvent', 'changes of parameters',
+                         SAMPLE_DEPTH)
 
 # Names of the joints in joint_states and phase_state.
 FRONT_WHEEL, REAR_WHEEL, COUPLER = 'front_wheel', 'rear_wheel', 'coupler'

@@ -27,7 +27,7 @@ def compiled(function: Function) -> Function:
         return function
     # numba's cache watches only the function's own file: let its name there tell of the others too.
     function.__qualname__ += f'_{_FINGERPRINT}'
-    kernel: Function = njit(**_OPTIONS)(function)
+    kernel: Function = njit(nogil=True, **_OPTIONS)(function)  # threads run side by side
     with suppress(RuntimeError):  # nowhere to keep it: it is compiled anew at every start
         kernel.enable_caching()  # type: ignore[attr-defined]
     return kernel

@@ -1,20 +1,31 @@
 """Many pairs at once: trajectories side by side in the lanes of the Taylor kernel, compiled where numba is."""
 
 import math
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dcdrw_msgs_py.quantity import check
-from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.quantity import flatten
+from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelParams
 from dcdrw_sim import strikes, taylor
 from dcdrw_sim.compiled import compiled
-from dcdrw_sim.simulation import LEAVING_SPEED, LONGEST_STEP, SHORTEST_STEP, MotionError, accept, work_parameters
+from dcdrw_sim.simulation import (
+    LEAVING_SPEED,
+    LONGEST_STEP,
+    SHORTEST_STEP,
+    STIFFEST,
+    MotionError,
+    accept,
+    work_parameters,
+)
 from dcdrw_sim.strikes import BACKWARD, FORWARD, NONE, End, first_strike, reset
 from dcdrw_sim.taylor import LANES, OMEGA1, OMEGA2, THETA1, THETA2, bare, expand, minimum, motion, rows, step_size
 
 Floats = NDArray[np.float64]
+Rigs = Any
+"""The rigs of N pairs in one: a `RigParams` in which every parameter is an array of shape (N,)."""
 
 TOLERANCE = 5e-16
 """Last term of the angles' series at the end of a step [rad]: strikes within 1e-9 over 100 time units."""
@@ -26,9 +37,6 @@ STATE = (THETA1, OMEGA1, THETA2, OMEGA2)
 # Plain numbers, which compile.
 TOO_FAST, NONE_YET, NO_PAIR = -2, -1, -1
 TIME_OVER, STRIKES, STANDING, FALLEN, STALLED, HUBS_MET = (int(end) for end in End)
-
-COLUMNS = {'k': taylor.K, 'b': taylor.B, 'D0': taylor.D0, 'S0': taylor.S}
-"""Parameters that may differ from pair to pair, beside the slope."""
 
 # Rows of the work array behind those of the series.
 (PAIR, AHEAD1, AHEAD2, SLOWEST1, SLOWEST2, STRIKE1, STRIKE2, MISS1, MISS2, REACH, STEP, WHEEL, DIRECTION, S0, STRIDE1,
@@ -48,14 +56,14 @@ class Ensemble(NamedTuple):
     counts: NDArray[np.int64]
     """Strikes of each pair, shape (N,)."""
     ends: NDArray[np.int64]
-    """`End` of each pair, shape (N,)."""
+    """`End` of each pair, or TOO_FAST, shape (N,)."""
     durations: Floats
     """Time at each pair's end [s], shape (N,)."""
 
 
 def run_ensemble(rig: RigParams, states: ArrayLike, seconds: float, capacity: int, tolerance: float = TOLERANCE,
-                 **columns: ArrayLike) -> Ensemble:
-    """Run many pairs of one rig, each with its own start and, where given, its own k, b, D0, S0 or slope.
+                 strict: bool = True, **columns: ArrayLike) -> Ensemble:
+    """Run many pairs of one rig, each with its own start and, where given, its own parameters.
 
     Args:
         rig: what all pairs share.
@@ -63,59 +71,119 @@ def run_ensemble(rig: RigParams, states: ArrayLike, seconds: float, capacity: in
         seconds: when to end.
         capacity: strikes to record of each pair; a pair with so many ends.
         tolerance: last term of the angles' series at the end of a step [rad].
-        columns: k, b, D0, S0, slope: shape (N,) or a scalar; NaN stands for the default.
+        strict: a motion too fast to follow is an error; else its pair ends TOO_FAST.
+        columns: parameters by their (dotted) names, as `spread`.
 
     Raises:
         ValueError: an impossible parameter, state, limit or shape.
         MotionError: a motion is too fast to follow.
 
     """
-    rig, starts = check(rig), np.ascontiguousarray(states, float)
-    if starts.ndim != 2 or starts.shape[1] != 4:
+    return run_pairs(spread(rig, len(np.atleast_1d(states)), columns), states, seconds, capacity, tolerance, strict)
+
+
+def run_pairs(rigs: Rigs, states: ArrayLike, seconds: float, capacity: int, tolerance: float = TOLERANCE,
+              strict: bool = True) -> Ensemble:
+    """Run many pairs, each of its own rig.
+
+    Args:
+        rigs: as `spread` and `take` give them.
+        states: as the other arguments, those of `run_ensemble`.
+        seconds: when to end.
+        capacity: strikes to record of each pair.
+        tolerance: of the angles' series [rad].
+        strict: whether a motion too fast to follow is an error.
+
+    Raises:
+        ValueError: an impossible state, limit or shape.
+        MotionError: a motion is too fast to follow.
+
+    """
+    starts, count = np.ascontiguousarray(states, float), len(rigs.k)
+    if starts.shape != (count, 4):
         raise ValueError(f'states must be of shape (N, 4), got {starts.shape}')
     if not (seconds >= 0.0 and capacity >= 1 and tolerance > 0.0):
         raise ValueError('seconds must be ≥ 0, capacity ≥ 1 and tolerance > 0, '
                          f'got {seconds}, {capacity} and {tolerance}')
-    limits = np.array([rig.front.alpha, math.inf, rig.rear.alpha, math.inf]) * (1 + 1e-12)
+    free = np.full(count, math.inf)
+    limits = np.column_stack([rigs.front.alpha, free, rigs.rear.alpha, free]) * (1 + 1e-12)
     if not (np.isfinite(starts) & (np.abs(starts) <= limits)).all():
         raise ValueError('states must be finite, their angles within ±α of their wheels')
-    count = len(starts)
-    parameters = _parameters(rig, count, columns)
     ensemble = Ensemble(np.zeros((count, capacity), STRIKE), np.zeros(count, np.int64), np.zeros(count, np.int64),
                         np.zeros(count))
     if count:
         with np.errstate(all='ignore'):
-            _run(_aligned(SIZE), parameters, starts, float(seconds), float(tolerance), *ensemble)
-    if (lost := np.flatnonzero(ensemble.ends == TOO_FAST)).size:
+            _run(_aligned(SIZE), _parameters(rigs), starts, float(seconds), float(tolerance), *ensemble)
+    if strict and (lost := np.flatnonzero(ensemble.ends == TOO_FAST)).size:
         raise MotionError(f'the motion of pair {lost[0]} at t = {ensemble.durations[lost[0]]:.9g} s is too fast to '
                           'follow')
     return ensemble
 
 
-def _parameters(rig: RigParams, count: int, columns: dict[str, ArrayLike]) -> Floats:
-    """Parameter rows of each pair, shape (N, PARAMETERS), in the order of the work array."""
-    known = (*COLUMNS, 'slope')
-    if unknown := set(columns) - set(known):
-        raise ValueError(f'{", ".join(sorted(unknown))} cannot differ from pair to pair; {", ".join(known)} can')
-    values = {name: np.asarray(columns.get(name, getattr(rig, name)), float) for name in known}
-    for name, value in values.items():
+def spread(rig: RigParams, count: int, columns: Mapping[str, ArrayLike]) -> Rigs:
+    """The rigs of N pairs, derived defaults filled in.
+
+    Args:
+        rig: what all pairs share.
+        count: N.
+        columns: parameters that differ from pair to pair, by their (dotted) names: shape (N,) or a scalar; NaN stands
+            for the default where there is a derived one.
+
+    Raises:
+        ValueError: an unknown name, another shape, or an impossible parameter, as `accept`.
+
+    """
+    common, values = flatten(rig), {}  # type: dict[str, Any], dict[str, Any]
+    if unknown := set(columns) - set(common):
+        raise ValueError(f'{", ".join(sorted(unknown))} is no parameter of a rig; known are {", ".join(common)}')
+    for name, shared in common.items():
+        value = np.asarray(columns.get(name, shared), float)
         if value.shape not in ((), (count,)):
             raise ValueError(f'{name} must be a scalar or of shape ({count},), got {value.shape}')
-    # As `RigParams.resolved`, pair by pair.
-    front = rig.front
+        values[name] = np.broadcast_to(value, (count,))
+    front, rear = (WheelParams(*(values[f'{side}.{name}'] for name in WheelParams._fields)) for side in (FRONT, REAR))
+    # As `RigParams.resolved`.
     values['S0'] = np.where(np.isnan(values['S0']), front.length, values['S0'])
-    at_rest = np.maximum(values['S0'] + front.length * math.sin(front.alpha), 0.0)
+    at_rest = np.maximum(values['S0'] + front.length * each(math.sin, front.alpha), 0.0)
     values['D0'] = np.where(np.isnan(values['D0']), at_rest, values['D0'])
-    for extreme in (np.min, np.max) if count else ():
-        limits: dict[str, Any] = {name: float(extreme(value)) for name, value in values.items()}
-        rig = accept(rig._replace(**limits))
-    lane = [0.0] * SIZE
-    work_parameters(lane, 0, rig)
-    parameters = np.tile(lane[taylor.G1:taylor.END:LANES], (count, 1))
-    for name, row in COLUMNS.items():
-        parameters[:, _column(row)] = values[name]
-    parameters[:, _column(taylor.COS_SLOPE)] = np.cos(values['slope'])
-    parameters[:, _column(taylor.SIN_SLOPE)] = np.sin(values['slope'])
+    rigs = RigParams(front, rear, *(values[name] for name in RigParams._fields[2:]))
+    if count:
+        _check(rigs)
+    return rigs
+
+
+def take(rigs: Rigs, which: Any) -> Rigs:
+    """Some of the rigs of `spread`, by an array of indices; one of them by a number."""
+    front, rear = (WheelParams(*(value[which] for value in wheel)) for wheel in (rigs.front, rigs.rear))
+    return RigParams(front, rear, *(value[which] for value in rigs[2:]))
+
+
+def each(function: Callable[[float], float], values: Any) -> Floats:
+    """A function of `math` of every value: numpy's own may round the same number in two ways, by its place."""
+    return np.fromiter(map(function, values.tolist()), float, len(values))
+
+
+def _check(rigs: Rigs) -> None:
+    """Accept all pairs, by those with the most extreme parameters."""
+    mass = 1.0 / (1.0 / rigs.front.mass + 1.0 / rigs.rear.mass)
+    with np.errstate(all='ignore'):
+        fastest = STIFFEST * np.sqrt(rigs.gravity / rigs.front.length)
+        stiffness = (rigs.k / (mass * fastest**2), rigs.b / (mass * fastest))
+    extremes = {int(most(column)) for column in (*rigs.front, *rigs.rear, *rigs[2:], *stiffness)
+                for most in (np.argmin, np.argmax)}
+    for index in sorted(extremes):
+        accept(take(rigs, index))
+
+
+def _parameters(rigs: Rigs) -> Floats:
+    """Parameter rows of each pair, shape (N, PARAMETERS), in the order of the work array."""
+    rows: Any = {}
+    work_parameters(rows, 0, rigs._replace(slope=0.0))
+    rows |= {taylor.S: rigs.S0, taylor.COS_SLOPE: each(math.cos, rigs.slope),
+             taylor.SIN_SLOPE: each(math.sin, rigs.slope)}
+    parameters = np.empty((len(rigs.k), taylor.PARAMETERS))
+    for row, value in rows.items():
+        parameters[:, _column(row)] = value
     return parameters
 
 

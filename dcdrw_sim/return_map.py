@@ -218,9 +218,10 @@ class ReturnMap:
 
 
 def spectrum(matrix: Floats) -> Complexes:
-    """Eigenvalues, those of largest modulus first."""
+    """Eigenvalues of a matrix, or of each of many, shape (..., n, n); those of largest modulus first."""
     values = np.linalg.eigvals(matrix).astype(complex)
-    ordered: Complexes = values[np.lexsort((-values.imag, -abs(values)))]
+    order = np.lexsort((-values.imag, -abs(values)))
+    ordered: Complexes = np.take_along_axis(values, order, -1)
     return ordered
 
 

@@ -4,9 +4,8 @@ import math
 from typing import Annotated, NamedTuple
 
 from dcdrw_msgs_py.quantity import Quantity
-from dcdrw_msgs_py.samples import CouplerSample, JointSample, Turn
+from dcdrw_msgs_py.samples import SECOND, CouplerSample, JointSample, Turn
 
-SECOND = 1_000_000_000
 LONGEST_GAP = SECOND
 """After a gap longer than this, frames fall due anew from there on [ns]."""
 

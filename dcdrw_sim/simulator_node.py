@@ -11,9 +11,10 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from std_srvs.srv import SetBool, Trigger
 
 from dcdrw_msgs_py.diagnosis import Diagnosis, Level
-from dcdrw_msgs_py.messages import SECOND, JointSampleWriter, to_stamp
+from dcdrw_msgs_py.messages import JointSampleWriter, to_stamp
 from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.topics import CLOCK, COUPLER_FORCE_COMMAND, JOINT_STATES
 from dcdrw_sim.simulation import MotionError, accept
 from dcdrw_sim.simulator import SimulatedRig, SimulatorParams, Timeline

@@ -8,8 +8,9 @@ from rclpy.node import Node
 from dcdrw_msgs_py.diagnosis import Diagnosis, Level
 from dcdrw_msgs_py.frame import Frame
 from dcdrw_msgs_py.image_messages import camera_message, image_message
-from dcdrw_msgs_py.messages import SECOND, JointSampleReader
+from dcdrw_msgs_py.messages import JointSampleReader
 from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
+from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.tagging import TagParams
 from dcdrw_msgs_py.topics import CAMERA_INFO, IMAGE_RAW, JOINT_STATES
 from dcdrw_sim.render import LookParams, Renderer

@@ -7,7 +7,8 @@ from threading import Condition, Event, Thread
 from typing import Any, Generic, TypeVar
 
 from dcdrw_msgs_py.frame import Frame
-from dcdrw_tracker.video import SECOND, VideoFile
+from dcdrw_msgs_py.samples import SECOND
+from dcdrw_tracker.video import VideoFile
 
 RETRY_SECONDS = 1.0
 """How often a camera that is not there is looked for."""

@@ -15,10 +15,10 @@ from dcdrw_msgs_py.camera import Camera, read_camera
 from dcdrw_msgs_py.diagnosis import Diagnosis, Level
 from dcdrw_msgs_py.frame import Frame
 from dcdrw_msgs_py.image_messages import camera, compressed_frame, frame, image_message, pose, tag_message
-from dcdrw_msgs_py.messages import SECOND, JointSampleWriter
+from dcdrw_msgs_py.messages import JointSampleWriter
 from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
 from dcdrw_msgs_py.rig import FRONT, REAR
-from dcdrw_msgs_py.samples import JointSample
+from dcdrw_msgs_py.samples import SECOND, JointSample
 from dcdrw_msgs_py.tagging import TagParams, mounts
 from dcdrw_msgs_py.topics import (
     CAMERA_INFO,

@@ -10,8 +10,8 @@ import numpy as np
 from dcdrw_msgs_py.camera import Camera
 from dcdrw_msgs_py.frame import Frame
 from dcdrw_msgs_py.opencv import opencv
+from dcdrw_msgs_py.samples import SECOND
 
-SECOND = 1_000_000_000
 RAW_RATE = 25.0
 """What FFmpeg makes of a stream without index and stamps (raw MJPEG, H.264) [Hz]."""
 ENDS_EARLY = 0.98

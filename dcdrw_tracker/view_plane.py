@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -133,6 +132,8 @@ class ViewPlane:
             return np.concatenate((off.ravel(), (scale - mean) * arm, PRIOR_PX * slant))
 
         steepest = math.tan(STEEPEST)
+
+        from scipy.optimize import least_squares  # a second to import, and few need it
 
         def solve(start: Floats) -> tuple[float, Floats, Floats]:
             done = least_squares(residuals, start, loss='soft_l1', f_scale=OUTLIER_PX, bounds=(-steepest, steepest),

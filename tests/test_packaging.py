@@ -17,8 +17,10 @@ ROOT = Path(__file__).parent.parent
 PACKAGES = ('dcdrw_msgs_py', 'dcdrw_sim', 'dcdrw_tracker', 'dcdrw')
 COMMANDS = {'dcdrw', *(node.name for node in EXECUTABLES)}
 # Third-party modules and the package.xml key (rosdep) that brings each.
-KEYS = {'numpy': 'python3-numpy', 'yaml': 'python3-yaml', 'matplotlib': 'python3-matplotlib'}
-OPTIONAL = {'numba', 'llvmlite'}
+KEYS = {'aiohttp': 'python3-aiohttp', 'cv2': 'python3-opencv', 'matplotlib': 'python3-matplotlib',
+        'numpy': 'python3-numpy', 'scipy': 'python3-scipy', 'yaml': 'python3-yaml'}
+OPTIONAL = {'dask', 'distributed', 'netCDF4', 'llvmlite', 'mcap', 'numba', 'pupil_apriltags', 'rosbags', 'tqdm',
+            'xarray'}
 
 
 def config() -> ConfigParser:
@@ -80,7 +82,8 @@ def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_pip_installs_what_ros2_run_looks_for(prefix):
     assert {path.name for path in (prefix / 'lib' / 'dcdrw').iterdir() if os.access(path, os.X_OK)} == COMMANDS
     assert (prefix / 'share/ament_index/resource_index/packages/dcdrw').exists()
-    for file in ('package.xml', 'config/rig.yaml', 'launch/trial.launch.py'):
+    for file in ('package.xml', 'config/rig.yaml', 'config/foxglove_layout.json', 'launch/trial.launch.py',
+                 'rviz/dcdrw.rviz'):
         assert (prefix / 'share' / 'dcdrw' / file).exists()
     (site,) = prefix.glob('lib/python3*/site-packages')
     assert {path.name for path in site.iterdir() if not path.name.endswith('-info')} == set(PACKAGES)
