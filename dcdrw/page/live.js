@@ -1,0 +1,160 @@
+// Keeps the connection, keeps what the charts need, and draws when something new has come.
+
+import { onLookChange } from './canvas.js';
+import { WINDOW_SECONDS, drawErrors, drawForce, drawGait, drawPhi } from './charts.js';
+import { setUpControls, showControls, showNotices } from './controls.js';
+import { drawRig } from './rig.js';
+
+const SILENT_MS = 1000;  // without news for so long the page no longer knows the state
+const DEAD_MS = 4000;  // and after this it connects anew
+const FIRST_WAIT_MS = 250, LONGEST_WAIT_MS = 4000;
+const MOST_POINTS = 4000;  // however fast simulated time runs
+const SIGNS = {
+  'SYNCHRONIZED': 'M3 13l6 6L21 5', 'CONVERGING': 'M3 4c4 6 12 6 18 7M3 20c4-6 12-6 18-7',
+  'STALLED': 'M8 4v16M16 4v16', 'NO DATA': 'M4 4l16 16M20 4L4 20',
+};
+
+const element = (id) => document.getElementById(id);
+let socket = null, wait = FIRST_WAIT_MS, heardAt = -Infinity, scheduled = 0;
+let kept, frame, board, run;
+
+function forget() {
+  kept = { phis: [], forces: [], falls: [] };
+  frame = board = run = null;
+}
+
+function connect() {
+  socket = new WebSocket(`${location.protocol.replace('http', 'ws')}//${location.host}/ws`);
+  const mine = socket;
+  let first = true;
+  mine.onmessage = ({ data }) => {
+    if (first) forget();  // the first message brings all that the charts need
+    for (const news of JSON.parse(data)) take(news, first);
+    first = false;
+    heardAt = performance.now();
+    wait = FIRST_WAIT_MS;
+    schedule();
+  };
+  mine.onclose = () => {
+    if (mine !== socket) return;
+    heardAt = -Infinity;
+    watch();
+    setTimeout(connect, wait * (0.75 + 0.5 * Math.random()));
+    wait = Math.min(2 * wait, LONGEST_WAIT_MS);
+  };
+}
+
+function take(news, old) {
+  if (news.notices && !old) showNotices(news.notices);
+  if (!news.state) return;
+  if (news.run !== run) {  // the source has started anew
+    run = news.run;
+    kept = { phis: [], forces: [], falls: [] };
+  }
+  frame = news;
+  if (news.board) board = news.board;
+  for (const [name, list] of Object.entries(kept)) {
+    list.push(...(news[name] || []));
+    trim(list, name === 'falls' ? ([, t]) => t : ([t]) => t);
+  }
+}
+
+// Drops what is older than the charts show; the stance before still shows.
+function trim(list, time) {
+  const start = now() - WINDOW_SECONDS - 3;
+  const old = list.findIndex((item) => time(item) >= start);
+  list.splice(0, Math.max(old, list.length - MOST_POINTS, 0));
+}
+
+const now = () => (kept.phis.length ? kept.phis.at(-1)[0] : 0);
+
+// Draws once before the screen is next refreshed; not at all while nobody sees it.
+function schedule() {
+  cancelAnimationFrame(scheduled);
+  scheduled = requestAnimationFrame(draw);
+}
+
+function draw() {
+  const rig = frame ? frame.rig : null;
+  watch();
+  drawRig(rig, board);
+  drawPhi(kept.phis, now(), board);
+  drawGait(kept.falls, now());
+  drawForce(kept.forces, now());
+  drawErrors(board);
+  showFigures(rig);
+  if (board) showNodes(board.nodes);
+}
+
+// The state and what may be done, from the last frame or from its absence.
+function watch() {
+  const silence = performance.now() - heardAt;
+  if (frame && silence < SILENT_MS) {
+    showState(frame.state, frame.detail);
+    if (board) showControls(board);
+  } else {
+    showState('NO DATA', 'no connection to dcdrw live; trying again …');
+    showControls(board && { ...board, simulated: false, recorder: false });
+  }
+  if (silence > DEAD_MS && socket.readyState === WebSocket.OPEN) socket.close();
+}
+
+function showState(state, detail) {
+  if (document.body.dataset.state !== state || element('state').textContent !== state) {
+    document.body.dataset.state = state;
+    element('state').textContent = state;
+    document.title = `${state} – dcdrw live`;
+  }
+  element('sign').firstElementChild.setAttribute('d', SIGNS[state]);
+  if (element('detail').textContent !== detail) element('detail').textContent = detail;
+}
+
+const signed = (value, digits) => (value < 0 ? '−' : '+') + Math.abs(value).toFixed(digits);
+
+function showFigures(rig) {
+  const known = rig && document.body.dataset.state !== 'NO DATA';
+  element('error').textContent = known ? `${signed(rig.error_percent, 1)} %` : '–';
+  element('phase').textContent = known ? `${rig.phase_percent.toFixed(1)} %` : '–';
+  element('stride').textContent = known ? `${(rig.phase_percent / 2).toFixed(1)} % of a stride` : '';
+  element('phi').textContent = known ? `${rig.phi_deg.toFixed(1)}°` : '–';
+  element('goal').textContent = known && board ? `goal ${(board.pitch_deg / 2).toFixed(1)}°` : '';
+  element('n').textContent = known ? signed(rig.n, 0).replace('+0', '0') : '–';
+  element('steps').textContent = known && board ? `${board.steps} steps` : '';
+  element('force').textContent = known && rig.force !== null
+    ? `${signed(rig.force, 1)} N, ${rig.force < 0 ? 'compression' : 'tension'}` : '[N]';
+  if (!board) return;
+  element('slope').textContent = `on a slope of ${(board.slope * 180 / Math.PI).toFixed(2)}°`;
+  element('ratio').textContent = board.ratio === null ? '[%]' : `[%], a step leaves ${(100 * board.ratio).toFixed(0)} %`;
+  element('rate').textContent = known && board.rate ? `${board.rate} samples per second` : '';
+}
+
+const MARKS = { OK: '✓', WARN: '!', ERROR: '✕', STALE: '?' };
+let shownNodes = '';
+
+function showNodes(nodes) {
+  const text = JSON.stringify(nodes);
+  if (text === shownNodes || !nodes.length) return;
+  shownNodes = text;
+  element('nodes').replaceChildren(...nodes.map(({ name, level, message }) => {
+    const item = document.createElement('li');
+    item.className = level;
+    for (const [kind, content] of [['mark', MARKS[level]], ['name', name], ['message', message]]) {
+      const part = document.createElement('span');
+      part.className = kind;
+      part.textContent = content;
+      item.append(part);
+    }
+    item.querySelector('.mark').setAttribute('aria-label', level);
+    return item;
+  }));
+}
+
+forget();
+setUpControls((command) => {
+  if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command));
+});
+if (location.search) history.replaceState(null, '', location.pathname);  // the cookie knows the token now
+onLookChange(schedule);
+setInterval(watch, 250);
+document.addEventListener('visibilitychange', () => document.hidden || schedule());
+connect();
