@@ -78,7 +78,8 @@ def propagators(rig: RigParams, segments: Sequence[Segment]) -> Floats:
     growth = durations[:, None, None, None] * jacobian(rig, State(*np.moveaxis(states, 1, 0)), S)
     size = 4 * STAGES
     system = np.eye(size) - np.einsum('ij,njab->niajb', _INTEGRALS, growth).reshape(-1, size, size)
-    deviations = np.linalg.solve(system, np.tile(np.eye(4), (STAGES, 1))).reshape(growth.shape)
+    start = np.tile(np.eye(4), (1, STAGES, 1))  # with all three axes: numpy 1 takes two for a row of vectors
+    deviations = np.linalg.solve(system, start).reshape(growth.shape)
     total: Floats = np.eye(4) + np.einsum('j,njab,njbc->nac', 0.5 * _WEIGHTS, growth, deviations)
     return total
 
