@@ -25,8 +25,14 @@ help:
 trial: $(READY)
 	@$(BIN)/dcdrw trial $(ARGS)
 
+# Cores side by side; then what starts processes, one after the other, for it minds the clock.
 test: $(READY)
+ifdef ARGS
 	@$(BIN)/python -m pytest $(ARGS)
+else
+	@$(BIN)/python -m pytest --numprocesses 2 --dist worksteal --ignore tests/cli --ignore tests/ros tests
+	@$(BIN)/python -m pytest tests/cli tests/ros
+endif
 
 lint: $(READY)
 	@$(BIN)/ruff check .

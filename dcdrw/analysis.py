@@ -4,6 +4,7 @@ import gc
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -140,9 +141,10 @@ class _Trial:
         front, rear = batch.names.index(joints.front_joint), batch.names.index(joints.rear_joint)
         columns = (batch.stamp_ns, *(table[:, wheel] for wheel in (front, rear)
                                      for table in (batch.position, batch.velocity)))
-        taken, phases, errors, verdicts = self._follow([column.tolist() for column in columns], run_of(batch.frame))
-        if not taken:
+        rows, phases, errors, verdicts = self._follow([column.tolist() for column in columns], run_of(batch.frame))
+        if not rows:
             return
+        taken = np.array(rows)
         _, front_turns, rear_turns, phis, differences, restarts = zip(*phases, strict=True)
         if joints.coupler_joint in batch.names:
             coupler = batch.names.index(joints.coupler_joint)
@@ -151,7 +153,7 @@ class _Trial:
             known = [np.full(len(taken), math.nan)] * 3
         self._parts.append([
             batch.stamp_ns[taken], batch.position[taken, front], batch.position[taken, rear], *known,
-            *(column for turns in (front_turns, rear_turns, phis) for column in np.array(turns, float).T),
+            *(column for turns in (front_turns, rear_turns, phis) for column in _columns(turns)),
             np.array(differences, np.int64), np.array(restarts, np.int64), np.array(errors, float),
             np.array(verdicts, bool)])
         self._rows += len(taken)
@@ -200,6 +202,12 @@ class _Trial:
             self._params, motion.rows(slice(self._held, None)), motion.rows(slice(self._held)),
             tuple(self._footfalls), self._monitor.status(), self._estimator.status(), self._received,
             self._unreadable)
+
+
+def _columns(turns: Sequence[Turn]) -> Floats:
+    """Angles and rates: np.array would take six times as long over tuples."""
+    columns: Floats = np.fromiter(chain.from_iterable(turns), np.float64, 2 * len(turns)).reshape(-1, 2).T
+    return columns
 
 
 _KINDS = (np.int64, *[np.float64] * 11, np.int64, np.int64, np.float64, np.bool_)

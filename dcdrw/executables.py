@@ -90,5 +90,5 @@ TRIAL = (SIMULATOR, PHASE_ESTIMATOR, SYNC_MONITOR)
 EXECUTABLES = (*TRIAL, TAG_TRACKER, VIRTUAL_CAMERA, MARKERS, RECORDER)
 
 RECORDED = (*dict.fromkeys(topic for node in EXECUTABLES for topic in (*node.subscribes, *node.publishes)
-                           if not topic.type.endswith('Image')), PARAMETER_EVENTS)
-"""The topics that a recorder keeps."""
+                           if not topic.type.endswith(('Image', 'MarkerArray'))), PARAMETER_EVENTS)
+"""The topics that a recorder keeps unasked: no pictures, and no drawings of what the others tell."""

@@ -20,13 +20,13 @@ def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         'record', help='record a running suite', epilog=_EPILOG,
-        description='Record every topic of the suite, images aside, as it comes off the wire.',
+        description='Record every topic of the suite, images and rig_markers aside, as it comes off the wire.',
         formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--out', type=Path, metavar='DIR',
                         help='folder of the recording; must not exist (default: recordings/DATE-TIME)')
     parser.add_argument('--note', default='', metavar='TEXT', help='what to keep with the recording')
     parser.add_argument('--topics', nargs='+', default=[], metavar='NAME',
-                        help='further topics, images for instance')
+                        help='further topics, image_raw or rig_markers for instance')
     parser.add_argument('--namespace', default='', metavar='NS', help='of the suite')
     parser.add_argument('--domain', type=domain, metavar='N', help='ROS domain (default: ROS_DOMAIN_ID, or 0)')
     parser.set_defaults(run=record, prog='dcdrw record')

@@ -5,7 +5,6 @@ import time
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from builtin_interfaces.msg import Time
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
@@ -13,6 +12,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from dcdrw.recording import Message, Recording
+from dcdrw_msgs_py.messages import to_stamp
 from dcdrw_msgs_py.node import advertise, steady_clock
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.topics import CLOCK, JOINT_STATES
@@ -22,6 +22,8 @@ SETTLE_SECONDS = 1.0
 """So long the listeners must have been the same before the replay begins: DDS finds them one by one."""
 CLOCK_NS = 10_000_000
 """How far the stamps go between two messages on /clock."""
+STEP_NS = 1_000_000_000
+"""A larger step of the stamps is none of the trial's time: the source has started anew, or has another clock."""
 LONGEST_SECONDS = 0.05
 """Time after which a tick lets others in, where the replay is behind [s]."""
 
@@ -36,7 +38,11 @@ class Part(NamedTuple):
 
 
 class ReplayNode(Node):
-    """Publishes each joint state when it is due by the recorder's log; what is late is sent at once, never dropped."""
+    """Publishes each joint state when it is due by its stamp; what is late is sent at once, never dropped.
+
+    So the rate is that of the trial's own time, also where this was simulated faster. Where the stamps stand still, go
+    back or jump, the recorder's log tells the time.
+    """
 
     def __init__(self, recording: Recording, topic: str, part: Part, names: Mapping[str, str], **kwargs: Any) -> None:
         super().__init__('replay', **kwargs)
@@ -47,11 +53,13 @@ class ReplayNode(Node):
         self.log_ns = part.begin_ns
         """Where in the recording the replay is."""
         self.done = False
-        self._listeners = 0
+        self._listeners: tuple[int, ...] = ()
         self._since = time.monotonic()
         self.playing = False
         self._messages: Iterator[Message] = iter(())
         self._next: Message | None = None
+        self._next_ns = 0
+        self._due_ns = 0
         self._begun = 0.0
         self._told_ns = -CLOCK_NS
         self._timer = self.create_timer(TICK_SECONDS, self._tick, clock=steady_clock())
@@ -60,6 +68,8 @@ class ReplayNode(Node):
         part = self._part
         self._messages = self._recording.messages([self._topic], part.begin_ns, part.end_ns)
         self._next = next(self._messages, None)
+        self._next_ns = _stamp_ns(self._next) if self._next else 0
+        self._due_ns = 0
         self._begun = time.monotonic()
         self.playing = True
 
@@ -72,7 +82,8 @@ class ReplayNode(Node):
     def _wait(self) -> None:
         """Begin when somebody listens, and nobody new has come for a while."""
         now = time.monotonic()
-        listeners = self.count_subscribers(JOINT_STATES.name) + self.count_subscribers(CLOCK.name)
+        listeners = (self.count_subscribers(JOINT_STATES.name), self.count_subscribers(CLOCK.name),
+                     self._joints.get_subscription_count(), self._clock.get_subscription_count())
         if listeners != self._listeners:
             self._listeners, self._since = listeners, now
         if self._joints.get_subscription_count() and now - self._since >= SETTLE_SECONDS:
@@ -80,11 +91,10 @@ class ReplayNode(Node):
 
     def _play(self) -> None:
         now = time.monotonic()
-        until_ns = self._part.begin_ns + int((now - self._begun) * self._part.rate * 1e9)
-        while self._next and self._next.log_ns <= until_ns and time.monotonic() - now < LONGEST_SECONDS:
-            self._publish(self._next)
-            self.log_ns = self._next.log_ns
-            self._next = next(self._messages, None)
+        until_ns = int((now - self._begun) * self._part.rate * 1e9)
+        while self._next and self._due_ns <= until_ns and time.monotonic() - now < LONGEST_SECONDS:
+            self._publish(self._next, self._next_ns)
+            self._advance()
         if self._next is None:
             if self._part.loop and self.sent:
                 self._begin()
@@ -92,12 +102,19 @@ class ReplayNode(Node):
                 self.playing, self.done = False, True
                 self._joints.wait_for_all_acked(Duration(seconds=1))
 
-    def _publish(self, message: Message) -> None:
-        sec, nanosec = struct.unpack_from('<iI' if message.data[1] & 1 else '>iI', message.data, 4)
-        stamp_ns = sec * SECOND + nanosec
+    def _advance(self) -> None:
+        last, last_ns = self._next, self._next_ns
+        self._next = next(self._messages, None)
+        if last and self._next:
+            self._next_ns = _stamp_ns(self._next)
+            step_ns = self._next_ns - last_ns
+            self._due_ns += step_ns if 0 < step_ns <= STEP_NS else self._next.log_ns - last.log_ns
+
+    def _publish(self, message: Message, stamp_ns: int) -> None:
+        self.log_ns = message.log_ns
         if not 0 <= stamp_ns - self._told_ns < CLOCK_NS:  # the clock first: no sample lies far in the future
             self._told_ns = stamp_ns
-            self._clock.publish(Clock(clock=Time(sec=sec, nanosec=nanosec)))
+            self._clock.publish(Clock(clock=to_stamp(stamp_ns)))
         if self._names:
             joints = deserialize_message(message.data, JointState)
             joints.name = [self._names.get(name, name) for name in joints.name]
@@ -105,3 +122,9 @@ class ReplayNode(Node):
         else:
             self._joints.publish(message.data)
         self.sent += 1
+
+
+def _stamp_ns(message: Message) -> int:
+    """The stamp of a serialized JointState."""
+    sec, nanosec = struct.unpack_from('<iI' if message.data[1] & 1 else '>iI', message.data, 4)
+    return int(sec * SECOND + nanosec)

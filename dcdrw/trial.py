@@ -172,9 +172,11 @@ class _Trial:
         recorder = RecorderParams(str(self.folder / RECORDING), self.options.note, topics, record=True)
         write_parameter_file((*self.params._replace(simulator=held), *(self.filmed or ()), recorder), file)
         for node in (RECORDER, *reversed(self.executables)):  # who listens, first
-            apart = ['-r', f'{JOINT_STATES.name}:={TRUTH}'] if self.filmed and node in (SIMULATOR, VIRTUAL_CAMERA) else []
-            self.nodes.append(NodeProcess(node.name, node.module, ['--ros-args', '--params-file', str(file), *apart],
-                                          environment, self.folder / f'{node.name}.log'))
+            arguments = ['--ros-args', '--params-file', str(file)]
+            if self.filmed and node in (SIMULATOR, VIRTUAL_CAMERA):
+                arguments += ['-r', f'{JOINT_STATES.name}:={TRUTH}']
+            self.nodes.append(NodeProcess(node.name, node.module, arguments, environment,
+                                          self.folder / f'{node.name}.log'))
         self._say('starting the nodes ...')
         self._spin_until(self._all_at_work, START_SECONDS, 'no data came through the nodes')
 

@@ -1,5 +1,6 @@
 """OpenCV, where it is installed: 4.6 (Ubuntu and Debian) to 5, whose ArUco modules differ."""
 
+import os
 from functools import cache
 from typing import Any
 
@@ -16,6 +17,7 @@ def opencv() -> Any:
         ValueError: it is not installed, or was built without ArUco.
 
     """
+    os.environ.setdefault('OPENCV_FFMPEG_LOGLEVEL', '-8')  # what is wrong with a video is told in one line of ours
     try:
         import cv2
     except ImportError:

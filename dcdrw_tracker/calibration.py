@@ -116,8 +116,9 @@ class _Path(NamedTuple):
     def fit(self, alpha: float, zero: float) -> tuple[Complexes, Complexes]:
         """Coefficients and residuals of hub = start + scale · path(ψ + zero) + off · exp(−iψ), by least squares."""
         terms = np.stack((np.ones_like(self.hub), rolled_path(alpha, self.psi + zero), np.exp(-1j * self.psi)), axis=1)
-        coefficients = np.linalg.lstsq(terms, self.hub, rcond=None)[0]
-        return coefficients, self.hub - terms @ coefficients
+        coefficients: Complexes = np.linalg.lstsq(terms, self.hub, rcond=None)[0]
+        residuals: Complexes = self.hub - terms @ coefficients
+        return coefficients, residuals
 
     def misfit(self, alpha: float, zero: float) -> float:
         """Root mean square of the residuals [m]."""
@@ -146,19 +147,20 @@ class _Path(NamedTuple):
 def _calibrate(name: str, views: Sequence[PairView], shape: WheelShape) -> WheelCalibration:
     path, alpha = _longest_path(name, views), shape.alpha
     zero = path.best_zero(alpha)
+    zero -= 2.0 * alpha * round((zero - float(np.angle(path.fit(alpha, zero)[0][1]))) / (2.0 * alpha))
     off = np.abs(path.fit(alpha, zero)[1])
     path = path.rows(off <= max(OUTLIER * float(np.median(off)), OUTLIER_AT_LEAST * shape.length))
     cells = np.floor((path.psi + zero + alpha) / (2.0 * alpha))
     steps = int(np.ptp(cells))
     if steps < LEAST_STEPS:
-        raise ValueError(f'the {name} wheel takes {steps} steps before the camera, but {LEAST_STEPS} are needed: film a '
-                         'longer way, from further off or with a wider lens')
+        raise ValueError(f'the {name} wheel takes {steps} steps before the camera, but {LEAST_STEPS} are needed: film '
+                         'a longer way, from further off or with a wider lens')
     found = path.solve(alpha, zero)
     _check(name, path, shape, steps, found)
     others = np.array([path.rows(cells != cell).solve(alpha, zero) for cell in np.unique(cells)])
     spreads = np.sqrt((len(others) - 1) * ((others - others.mean(axis=0)) ** 2).mean(axis=0))
-    return WheelCalibration(len(path.psi), steps, *map(Estimate, found.tolist(), spreads.tolist()),
-                            misfit=path.misfit(alpha, zero))
+    turn, length, zeroed, tag_x, tag_y = map(Estimate, found.tolist(), spreads.tolist())
+    return WheelCalibration(len(path.psi), steps, turn, length, zeroed, tag_x, tag_y, path.misfit(alpha, zero))
 
 
 def _longest_path(name: str, views: Sequence[PairView]) -> _Path:
@@ -178,8 +180,8 @@ def _check(name: str, path: _Path, shape: WheelShape, steps: int, found: Floats)
     """Refuse what is not the path of a rolling wheel."""
     went, rolled = float(np.ptp(path.hub.real)), steps * shape.step_length
     if not 0.5 < went / rolled < 2.0:
-        raise ValueError(f'the hub of the {name} wheel travels {went:.2f} m in {steps} steps, not about {rolled:.2f} m: '
-                         f'the camera must stand still, not follow the pair; else see size and {name}.length')
+        raise ValueError(f'the hub of the {name} wheel travels {went:.2f} m in {steps} steps, not about {rolled:.2f} '
+                         f'm: the camera must stand still, not follow the pair; else see size and {name}.length')
     misfit = path.misfit(shape.alpha, path.best_zero(shape.alpha))
     if misfit <= LARGEST_MISFIT * shape.length:
         return

@@ -114,19 +114,21 @@ class PhaseEstimator:
             now_ns: the node's clock; 0 where it is unknown, as a simulated clock that has not started.
 
         """
-        if not (abs(joints.front.angle) <= LARGEST_ROTATION and abs(joints.rear.angle) <= LARGEST_ROTATION):
+        stamp_ns, front, rear, _, run = joints
+        if not (-LARGEST_ROTATION <= front.angle <= LARGEST_ROTATION
+                and -LARGEST_ROTATION <= rear.angle <= LARGEST_ROTATION):
             self.refuse('not finite')
             return None
-        if now_ns and joints.stamp_ns - now_ns > self.params.max_future * 1e9:
+        if now_ns and stamp_ns - now_ns > self.params.max_future * 1e9:
             self.refuse('future')
             return None
-        self._cadence.tick(joints.stamp_ns)
+        self._cadence.tick(stamp_ns)
         last = self._last
         if last is None:
             return self._start(joints)
-        if joints.run != last.run:
+        if run != last.run:
             return self._restart([joints])
-        elapsed_ns = joints.stamp_ns - last.stamp_ns
+        elapsed_ns = stamp_ns - last.stamp_ns
         if elapsed_ns > 0:
             # While outliers are held, a sample that could go on from either belongs to the nearer.
             stray = self._held[-1] if self._held and self._held[-1].stamp_ns > last.stamp_ns else None
@@ -135,7 +137,7 @@ class PhaseEstimator:
                 if update:
                     return update
             self.refuse('outlier')
-        elif elapsed_ns == 0 or (self._held and joints.stamp_ns == self._held[-1].stamp_ns):
+        elif elapsed_ns == 0 or (self._held and stamp_ns == self._held[-1].stamp_ns):
             self.refuse('repeated')
             return None
         else:
@@ -223,7 +225,8 @@ class PhaseEstimator:
 
     def _speed(self, turn: Turn) -> float:
         """The source's own speed, where it gives one that a wheel can have."""
-        return turn.rate if abs(turn.rate) <= self.params.max_speed else math.nan
+        rate, limit = turn.rate, self._tolerance.max_speed
+        return rate if -limit <= rate <= limit else math.nan
 
     def _footfalls(self, front: list[Strike], rear: list[Strike]) -> tuple[Footfall, ...]:
         rig = self.params

@@ -55,16 +55,13 @@ class Rotation:
         self._wraps: bool | None = False if abs(angle) > math.tau + self.pitch else None
         self._past = deque([(stamp_ns, angle)])
         self._cell = self._first_cell = math.floor((angle + alpha + 0.5 * tolerance.hysteresis) / self.pitch)
+        self.steps = 0
+        """n_i, since the start."""
         self._low, self._high = self._boundaries()
         self._backward_at = self._low
         if angle < self._low + tolerance.hysteresis:
             self._backward_at -= tolerance.hysteresis
         self._forward_at = self._high
-
-    @property
-    def steps(self) -> int:
-        """n_i, steps since the start."""
-        return self._cell - self._first_cell
 
     @property
     def theta(self) -> float:
@@ -123,6 +120,7 @@ class Rotation:
             forward = psi >= self._forward_at
             crossed = self._high if forward else self._low
             self._cell += 1 if forward else -1
+            self.steps = self._cell - self._first_cell
             share = min(max((crossed - self.psi) / (psi - self.psi), 0.0), 1.0)
             strikes.append(Strike(self._stamp_ns + round(share * elapsed_ns), self.steps))
             self._low, self._high = self._boundaries()

@@ -108,6 +108,7 @@ class SyncMonitor:
         self.params = params
         self._front_alpha, self._rear_alpha = params.front.alpha, params.rear.alpha
         self._pitch = self._front_alpha + self._rear_alpha
+        self._stall_ns = params.stall_after * 1e9
 
     def reset(self) -> None:
         """Start afresh with the next sample."""
@@ -128,7 +129,8 @@ class SyncMonitor:
     def update(self, phase: PhaseSample) -> SyncSample | None:
         """Take the next sample; None where an angle is none, or where the stamp is that of the last sample."""
         stamp_ns, now_front, now_rear, phi, n, restarts = phase
-        if not (abs(now_front.angle) <= math.pi and abs(now_rear.angle) <= math.pi and abs(phi.angle) <= math.pi):
+        front, rear = now_front.angle, now_rear.angle
+        if not (-math.pi <= front <= math.pi and -math.pi <= rear <= math.pi and -math.pi <= phi.angle <= math.pi):
             return None
         last = self._last
         if last is None:
@@ -138,15 +140,17 @@ class SyncMonitor:
             return None
         if restarts != last.restarts or not 0.0 < dt <= self.params.stale_after:
             return self._restart(phase)
-        front = _advance(last.front, now_front, dt, self._front_alpha)
-        rear = _advance(last.rear, now_rear, dt, self._rear_alpha)
-        if not _continuous(last, phase, front, rear):
+        front_strikes = _strikes(last.front, now_front, dt, self._front_alpha)
+        rear_strikes = _strikes(last.rear, now_rear, dt, self._rear_alpha)
+        if front_strikes is None or rear_strikes is None:
+            return self._restart(phase)
+        if n - last.step_difference != front_strikes - rear_strikes and not _may_miss_strikes(last, phase, dt):
             return self._restart(phase)
         self._cadence.tick(stamp_ns)
-        if front.strikes or rear.strikes:
-            self._take_strikes(last, phase, front, rear)
+        if front_strikes or rear_strikes:
+            self._take_strikes(last, phase, front_strikes, rear_strikes)
         self._take_step_difference(n)
-        self._take_error(last, phase, front.strikes, dt)
+        self._take_error(last, phase, front_strikes, dt)
         self._last = phase
         return self._sample(phase)
 
@@ -194,16 +198,17 @@ class SyncMonitor:
         self._cadence.jump(phase.stamp_ns)
         return self._start(phase)
 
-    def _take_strikes(self, last: PhaseSample, phase: PhaseSample, front: '_Advance', rear: '_Advance') -> None:
+    def _take_strikes(self, last: PhaseSample, phase: PhaseSample, front: int, rear: int) -> None:
         """Note the error at each forward strike of the front wheel; φ is continuous there, so it is interpolated."""
-        if front.strikes > 0:
+        if front > 0:
             self._struck_ns[FRONT] = phase.stamp_ns
             error = self._percent(last.phi.angle)
             change = math.remainder(self._percent(phase.phi.angle) - error, 100.0)
-            for strike in range(front.strikes):
-                share = (self._front_alpha * (1 + 2 * strike) - last.front.angle) / (front.motion or 1.0)
+            motion = phase.front.angle - last.front.angle + 2.0 * self._front_alpha * front
+            for strike in range(front):
+                share = (self._front_alpha * (1 + 2 * strike) - last.front.angle) / (motion or 1.0)
                 self._note(math.remainder(error + min(max(share, 0.0), 1.0) * change, 100.0))
-        if rear.strikes > 0:
+        if rear > 0:
             self._struck_ns[REAR] = phase.stamp_ns
 
     def _note(self, error: float) -> None:
@@ -260,8 +265,7 @@ class SyncMonitor:
         return math.remainder(foretold + surprise * dt / (dt + SMOOTHING), 100.0)
 
     def _stalled(self, stamp_ns: int) -> tuple[str, ...]:
-        limit = self.params.stall_after * 1e9
-        return tuple(wheel for wheel, struck_ns in self._struck_ns.items() if stamp_ns - struck_ns > limit)
+        return tuple([wheel for wheel, struck_ns in self._struck_ns.items() if stamp_ns - struck_ns > self._stall_ns])
 
     def _percent(self, phi: float) -> float:
         """100 (p − 0.5), in [−50, 50)."""
@@ -272,33 +276,24 @@ class SyncMonitor:
         return SyncSample(phase.stamp_ns, self._error / 100.0 * self._pitch, self._error, self._synchronized)
 
 
-class _Advance(NamedTuple):
-    """What a stance angle tells of a wheel's motion between two samples."""
+def _strikes(last: Turn, now: Turn, dt: float, alpha: float) -> int | None:
+    """Forward strikes of a wheel between two samples, negative for backward ones; None where no wheel moves so.
 
-    strikes: int
-    """Forward strikes, negative for backward ones: the angle falls (rises) by 2α at each."""
-    motion: float
-    """How far the wheel has turned [rad]."""
-    expected: float
-    """How far it turns at its speed [rad]."""
-    plausible: bool
-
-
-def _advance(last: Turn, now: Turn, dt: float, alpha: float) -> _Advance:
-    rate = 0.5 * (last.rate + now.rate)
-    expected = rate * dt if abs(rate) <= FASTEST else 0.0
+    Its angle falls (rises) by 2α at each.
+    """
+    expected = _expected(last, now, dt)
     change = now.angle - last.angle
     strikes = round((expected - change) / (2.0 * alpha))
-    motion = change + 2.0 * alpha * strikes
-    return _Advance(strikes, motion, expected, abs(motion - expected) <= 0.5 * alpha + abs(expected))
+    surprise = change + 2.0 * alpha * strikes - expected
+    return strikes if abs(surprise) <= 0.5 * alpha + abs(expected) else None
 
 
-def _continuous(last: PhaseSample, now: PhaseSample, front: _Advance, rear: _Advance) -> bool:
-    """Whether a pair can move from one sample to the other: angles as the speeds say, n as the strikes say.
+def _expected(last: Turn, now: Turn, dt: float) -> float:
+    """How far a wheel turns between two samples at their speeds [rad]."""
+    rate = 0.5 * (last.rate + now.rate)
+    return rate * dt if -FASTEST <= rate <= FASTEST else 0.0
 
-    After a gap in which a wheel may have struck unseen, n is taken as it comes.
-    """
-    if not (front.plausible and rear.plausible):
-        return False
-    long = max(abs(front.expected), abs(rear.expected)) > LONG_WAY
-    return long or now.step_difference - last.step_difference == front.strikes - rear.strikes
+
+def _may_miss_strikes(last: PhaseSample, now: PhaseSample, dt: float) -> bool:
+    """Whether a wheel may strike unseen between two samples: n is then taken as it comes."""
+    return max(abs(_expected(last.front, now.front, dt)), abs(_expected(last.rear, now.rear, dt))) > LONG_WAY

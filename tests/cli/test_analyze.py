@@ -128,6 +128,14 @@ def test_speeds_are_derived_where_none_are_recorded(motion, tmp_path):
     assert np.nanmedian(np.abs(trial.motion.omega1 - motion[1].omega1)) < 0.03
 
 
+def is_alive(pid: int) -> bool:
+    """Whether a process still holds what it had open."""
+    try:
+        return Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0] not in 'ZX'
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
 def test_killed_trial_is_analyzed_up_to_its_last_second(tmp_path):
     (tmp_path / 'rig.yaml').write_text(STIFF)
     process = subprocess.Popen(
@@ -139,8 +147,12 @@ def test_killed_trial_is_analyzed_up_to_its_last_second(tmp_path):
                 break
         children = Path(f'/proc/{process.pid}/task/{process.pid}/children').read_text().split()
         killed_ns = time.time_ns()
-        for child in (process.pid, *map(int, children)):
-            os.kill(child, signal.SIGKILL)
+        killed = [process.pid, *map(int, children)]
+        for pid in killed:
+            os.kill(pid, signal.SIGKILL)
+        process.wait()
+        while any(map(is_alive, killed)):  # the lock on the file goes with the recorder
+            time.sleep(0.01)
     trial, agreements = read_trial(tmp_path / 'out')
     assert killed_ns - trial.motion.stamp_ns[-1] < 1e9
     assert trial.motion.seconds[-1] > 1.0

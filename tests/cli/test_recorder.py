@@ -17,6 +17,7 @@ from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
+from dcdrw.executables import RECORDED
 from dcdrw.recorder import Recorder
 from dcdrw.recording import Recording
 from dcdrw_msgs_py.messages import to_stamp
@@ -159,6 +160,12 @@ def test_service_starts_and_stops_recordings(bench, tmp_path):
     assert about.keys() >= {'dcdrw_version', 'git_revision', 'machine', 'started'}
     for text in (about['parameters'], (tmp_path / 'one' / 'parameters.yaml').read_text()):
         assert yaml.safe_load(text)['phase_estimator']['ros__parameters']['hysteresis_deg'] == 2.5
+
+
+def test_pictures_and_drawings_are_kept_only_when_asked_for():
+    names = {topic.name for topic in RECORDED}
+    assert names >= {'joint_states', 'phase_state', 'footfalls', 'synchronized', '/diagnostics', 'tag_detections'}
+    assert not names & {'image_raw', 'image_raw/compressed', 'debug_image', 'rig_markers'}
 
 
 def test_existing_folder_is_never_overwritten(tmp_path):

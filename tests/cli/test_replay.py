@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from itertools import pairwise
 from pathlib import Path
 
@@ -77,6 +78,21 @@ def test_part_of_a_recording_is_replayed_by_its_own_names(bench, renamed):
     assert [message.position[0] for message in joints] == list(range(200, 450))
     assert joints[0].name == ['hub_a', 'arm', 'hub_b']
     assert stamp_ns(joints[0].header.stamp) == 7 * 10**9
+
+
+def test_pace_is_that_of_the_stamps_whatever_the_recorder_saw(bench, tmp_path):
+    """A trial that was simulated ten times as fast as real takes its own time, and does not wait where stamps jump."""
+    jump = 10**12
+    bag = write_bag(tmp_path / 'bag', [
+        (10**18 + k * 10**6, joint_state(k * 10**7 + (jump if k >= 100 else 0), ['front_wheel'], [k]))
+        for k in range(200)])
+    joints, clocks = bench.hear(JOINT_STATES), bench.hear(CLOCK)
+    process = replay(bench, str(bag))
+    bench.wait(lambda: joints, 'a joint state')
+    begun = time.monotonic()
+    assert finish(bench, process) == '200 joint states sent\n'
+    assert time.monotonic() - begun > 1.0  # of 1.98 s by the stamps, 0.2 s by the log
+    assert stamp_ns(clocks[-1].clock) == stamp_ns(joints[-1].header.stamp) == jump + 199 * 10**7
 
 
 def test_rig_file_gives_the_joints_the_names_of_the_suite(bench, renamed, tmp_path):

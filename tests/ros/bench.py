@@ -52,7 +52,7 @@ class Bench:
     def start(self, name: str, *arguments: str, **parameters: Any) -> subprocess.Popen[bytes]:
         """Start a node with parameters; double underscores stand for dots."""
         overrides = [part for key, value in parameters.items()
-                     for part in ('-p', f'{key.replace("__", ".")}:={str(value).lower()}')]
+                     for part in ('-p', f'{key.replace("__", ".")}:={_yaml(value)}')]
         with (self.folder / f'{name}.log').open('ab') as log:
             process = subprocess.Popen(
                 [sys.executable, '-m', MODULES[name], '--ros-args', *overrides, *arguments], stdout=log,
@@ -126,3 +126,7 @@ class Bench:
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             self.executor.spin_once(timeout_sec=0.02)
+
+
+def _yaml(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
