@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dcdrw_msgs_py.quantity import flatten
+from dcdrw_msgs_py.quantity import fields, lookup
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelParams
 from dcdrw_sim import strikes, taylor
 from dcdrw_sim.compiled import compiled
@@ -33,6 +33,7 @@ TOLERANCE = 5e-16
 STRIKE = np.dtype([('wheel', np.int8), ('direction', np.int8), ('t', float), ('state', float, (4,))])
 """One strike: wheel 1 or 2, direction, time [s], and the state just before it."""
 
+_FIELDS = tuple(fields(RigParams))
 STATE = (THETA1, OMEGA1, THETA2, OMEGA2)
 # Plain numbers, which compile.
 TOO_FAST, NONE_YET, NO_PAIR = -2, -1, -1
@@ -133,7 +134,8 @@ def spread(rig: RigParams, count: int, columns: Mapping[str, ArrayLike]) -> Rigs
         ValueError: an unknown name, another shape, or an impossible parameter, as `accept`.
 
     """
-    common, values = flatten(rig), {}  # type: dict[str, Any], dict[str, Any]
+    common = {field.name: lookup(rig, field.name) for field in _FIELDS}
+    values: dict[str, Any] = {}
     if unknown := set(columns) - set(common):
         raise ValueError(f'{", ".join(sorted(unknown))} is no parameter of a rig; known are {", ".join(common)}')
     for name, shared in common.items():
@@ -164,15 +166,17 @@ def each(function: Callable[[float], float], values: Any) -> Floats:
 
 
 def _check(rigs: Rigs) -> None:
-    """Accept all pairs, by those with the most extreme parameters."""
+    """Refuse all pairs for one that `accept` refuses: one at the end of a column, or the stiffest."""
+    for field in _FIELDS:
+        column = lookup(rigs, field.name)
+        for index in (int(np.argmin(column)), int(np.argmax(column))):
+            if not field.quantity.allows(float(column[index])):
+                accept(take(rigs, index))
     mass = 1.0 / (1.0 / rigs.front.mass + 1.0 / rigs.rear.mass)
-    with np.errstate(all='ignore'):
-        fastest = STIFFEST * np.sqrt(rigs.gravity / rigs.front.length)
-        stiffness = (rigs.k / (mass * fastest**2), rigs.b / (mass * fastest))
-    extremes = {int(most(column)) for column in (*rigs.front, *rigs.rear, *rigs[2:], *stiffness)
-                for most in (np.argmin, np.argmax)}
-    for index in sorted(extremes):
-        accept(take(rigs, index))
+    fastest = STIFFEST * np.sqrt(rigs.gravity / rigs.front.length)
+    for stiffness in (rigs.k / (mass * fastest**2), rigs.b / (mass * fastest)):
+        if stiffness.max() > 1.0:
+            accept(take(rigs, int(np.argmax(stiffness))))
 
 
 def _parameters(rigs: Rigs) -> Floats:
