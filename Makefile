@@ -7,7 +7,7 @@ VENV_FLAGS := --system-site-packages
 EXTRAS := figures,speed,record,live,sweep,test,lint
 else
 VENV := .venv
-EXTRAS := ros,figures,speed,camera,record,live,sweep,test,lint
+EXTRAS := ros,figures,speed,camera,apriltag,record,live,sweep,test,lint
 # The wheels' loader marks its environment; another environment's mark must not reach ours.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 endif

@@ -65,8 +65,10 @@ def _compare_phases(recording: Recording, name: str, analysis: Analysis) -> Agre
     motion = type(analysis.motion)(*both)
     numbers = np.column_stack([getattr(motion, column) for column in _COLUMNS])
     given = list(_runs(motion.restarts, _Phases(motion.stamp_ns, numbers, motion.step_difference)))
-    if told and given:  # what came before the first joint state that was recorded tells nothing
+    if told and given:  # what came before the first joint state that was recorded, or after the last, tells nothing
         told[0] = told[0].rows(told[0].stamp_ns >= given[0].stamp_ns[0])
+        if len(told) == len(given):
+            told[-1] = told[-1].rows(told[-1].stamp_ns <= given[-1].stamp_ns[-1])
     equal = sum(_count_equal(one, other) for one, other in zip(told, given, strict=False))
     return Agreement(sum(len(run.stamp_ns) for run in told), equal)
 

@@ -54,4 +54,5 @@ def fit_decay(errors: Sequence[float]) -> Decay:
     if slope == 0.0 or math.sqrt(2.0 * found.cost / (count - 3) / slope) > LARGEST_UNCERTAINTY or not 0.0 < ratio < 1.0:
         return Decay()
     limit, start = np.linalg.lstsq(np.column_stack([np.ones(count), ratio**steps]), values, rcond=None)[0]
-    return Decay(float(limit), float(start), ratio)
+    # A straight line fits any errors with a limit far away, which no phase can have.
+    return Decay(float(limit), float(start), ratio) if abs(limit) <= 50.0 else Decay()

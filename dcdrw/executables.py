@@ -71,7 +71,7 @@ MARKERS = Executable(
     (MarkerParams,), (JOINT_STATES, DIAGNOSTICS), (RIG_MARKERS, DIAGNOSTICS))
 
 RECORDER = Executable(
-    'recorder', 'dcdrw.recorder_node', 'while it records: every topic of the suite, images aside, into a recording',
+    'recorder', 'dcdrw.recorder_node', 'while it records: every topic but images and markers, into a recording',
     (RecorderParams,), (), (DIAGNOSTICS,), ('~/record (std_srvs/srv/SetBool)',))
 
 VIRTUAL_CAMERA = Executable(

@@ -171,9 +171,9 @@ class Recorder:
             'offered_qos_profiles': yaml_text(topic.qos).strip(), 'topic_type_hash': topic.hash})
         self.counts[name] = 0
 
-    def write(self, topic: str, data: bytes) -> None:
-        """Take a serialized message (CDR) that has come now."""
-        now = self._zero_ns + time.monotonic_ns()
+    def write(self, topic: str, data: bytes, log_ns: int | None = None) -> None:
+        """Take a serialized message (CDR) that has come at a time, by default now."""
+        now = self._zero_ns + time.monotonic_ns() if log_ns is None else log_ns
         self._writer.add_message(self._channels[topic], now, data, now)
         self.counts[topic] += 1
         self._start_ns, self._end_ns = self._start_ns or now, now

@@ -18,8 +18,9 @@ from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.topics import CLOCK, JOINT_STATES
 
 TICK_SECONDS = 0.001
-SETTLE_SECONDS = 1.0
-"""So long the listeners must have been the same before the replay begins: DDS finds them one by one."""
+LOOK_SECONDS = 0.05
+SETTLE_SECONDS = 1.5
+"""So long nobody new must have come before the replay begins: DDS finds nodes, and what they listen to, one by one."""
 CLOCK_NS = 10_000_000
 """How far the stamps go between two messages on /clock."""
 STEP_NS = 1_000_000_000
@@ -53,16 +54,15 @@ class ReplayNode(Node):
         self.log_ns = part.begin_ns
         """Where in the recording the replay is."""
         self.done = False
-        self._listeners: tuple[int, ...] = ()
+        self._found: tuple[int, ...] = ()
         self._since = time.monotonic()
-        self.playing = False
         self._messages: Iterator[Message] = iter(())
         self._next: Message | None = None
         self._next_ns = 0
         self._due_ns = 0
         self._begun = 0.0
         self._told_ns = -CLOCK_NS
-        self._timer = self.create_timer(TICK_SECONDS, self._tick, clock=steady_clock())
+        self._timer = self.create_timer(LOOK_SECONDS, self._wait, clock=steady_clock())
 
     def _begin(self) -> None:
         part = self._part
@@ -71,25 +71,22 @@ class ReplayNode(Node):
         self._next_ns = _stamp_ns(self._next) if self._next else 0
         self._due_ns = 0
         self._begun = time.monotonic()
-        self.playing = True
-
-    def _tick(self) -> None:
-        if self.playing:
-            self._play()
-        elif not self.done:
-            self._wait()
 
     def _wait(self) -> None:
         """Begin when somebody listens, and nobody new has come for a while."""
         now = time.monotonic()
-        listeners = (self.count_subscribers(JOINT_STATES.name), self.count_subscribers(CLOCK.name),
-                     self._joints.get_subscription_count(), self._clock.get_subscription_count())
-        if listeners != self._listeners:
-            self._listeners, self._since = listeners, now
+        found = (self._joints.get_subscription_count(), self._clock.get_subscription_count(),
+                 len(self.get_node_names()), len(self.get_topic_names_and_types()))
+        if found != self._found:
+            self._found, self._since = found, now
         if self._joints.get_subscription_count() and now - self._since >= SETTLE_SECONDS:
+            self.destroy_timer(self._timer)
             self._begin()
+            self._timer = self.create_timer(TICK_SECONDS, self._play, clock=steady_clock())
 
     def _play(self) -> None:
+        if self.done:
+            return
         now = time.monotonic()
         until_ns = int((now - self._begun) * self._part.rate * 1e9)
         while self._next and self._due_ns <= until_ns and time.monotonic() - now < LONGEST_SECONDS:
@@ -99,7 +96,7 @@ class ReplayNode(Node):
             if self._part.loop and self.sent:
                 self._begin()
             else:
-                self.playing, self.done = False, True
+                self.done = True
                 self._joints.wait_for_all_acked(Duration(seconds=1))
 
     def _advance(self) -> None:

@@ -18,7 +18,7 @@ from dcdrw.recorder import INFORMATION, METADATA, PARAMETERS
 from dcdrw.recording import find
 from dcdrw.report_page import page
 from dcdrw.summary import final_band, sentence
-from dcdrw_msgs_py.rig import FRONT
+from dcdrw_msgs_py.rig import FRONT, RigParams
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.topics import JOINT_STATES
 
@@ -45,6 +45,8 @@ class Trial(NamedTuple):
     """Note, machine, version and so on; empty where nothing was recorded."""
     decay: Decay
     """Of its error from step to step."""
+    rig: RigParams
+    """k, b and slope are NaN where neither a simulator nor a rig file told them."""
 
 
 TRIAL_COLUMNS: dict[str, Any] = {
@@ -57,9 +59,9 @@ TRIAL_COLUMNS: dict[str, Any] = {
     'final_phase_high_percent': lambda trial: 50.0 + final_band(trial.analysis)[1],
     'contraction_per_step': lambda trial: trial.decay.ratio,
     'limit_percent': lambda trial: 50.0 + trial.decay.limit,
-    'k': lambda trial: trial.analysis.params.rig.k,
-    'b': lambda trial: trial.analysis.params.rig.b,
-    'slope_deg': lambda trial: math.degrees(trial.analysis.params.rig.slope),
+    'k': lambda trial: trial.rig.k,
+    'b': lambda trial: trial.rig.b,
+    'slope_deg': lambda trial: math.degrees(trial.rig.slope),
     'front_steps': lambda trial: trial.analysis.status.steps,
     'slips': lambda trial: trial.analysis.status.slips,
     'seconds': lambda trial: float(trial.analysis.motion.seconds[-1]),
@@ -133,7 +135,11 @@ def open_trial(path: Path, name: str, rig: Path | None = None, topic: str = JOIN
     folder = find(path)
     folder = folder if folder.is_dir() else folder.parent
     errors = analysis.status.history
-    return Trial(name, analysis, _source(folder), _about(folder), fit_decay(errors))
+    source = _source(folder)
+    built = analysis.params.rig
+    if source == MEASURED and not rig:
+        built = built._replace(k=math.nan, b=math.nan, slope=math.nan)
+    return Trial(name, analysis, source, _about(folder), fit_decay(errors), built)
 
 
 def table(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:

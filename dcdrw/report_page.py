@@ -28,7 +28,7 @@ body { font: 16px/1.5 system-ui, sans-serif; max-width: 70rem; margin: 2rem auto
 h2 { margin-top: 3rem; border-bottom: 1px solid var(--line); }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { padding: .3rem .7rem; border-bottom: 1px solid var(--line); text-align: right; white-space: nowrap; }
+th, td { padding: .3rem .5rem; border-bottom: 1px solid var(--line); text-align: right; white-space: nowrap; }
 th:first-child, td:first-child, .text { text-align: left; }
 .ok { color: var(--ok); font-weight: 600; } .bad { color: var(--bad); font-weight: 600; }
 figure { margin: 1rem 0; background: white; border-radius: .4rem; padding: .4rem; }
@@ -85,14 +85,14 @@ def _table(trials: Sequence['Trial']) -> str:
     units = ('', '', '% of a step', 'steps', '% of a step', '% of the error', '% of a step', 'N/m', 'N·s/m', '°', '')
     rows = [''.join(f'<th>{head}<br><small>{unit}</small></th>' for head, unit in zip(heads, units, strict=True))]
     for number, trial in enumerate(trials):
-        status, rig = trial.analysis.status, trial.analysis.params.rig
+        status, rig = trial.analysis.status, trial.rig
         low, high = final_band(trial.analysis)
         steps = status.steps_to_synchronization
         cells = (f'<a href="#trial{number}">{html.escape(trial.name)}</a>', trial.source,
                  _number(100 * status.initial_phase, 1), '–' if steps is None else str(steps),
                  f'{_number(50 + low, 1)} to {_number(50 + high, 1)}', _number(100 * trial.decay.ratio, 1),
-                 _number(50 + trial.decay.limit, 1), f'{rig.k:.4g}', f'{rig.b:.4g}',
-                 f'{math.degrees(rig.slope):.3g}', _verdict(trial))
+                 _number(50 + trial.decay.limit, 1), *map(_short, (rig.k, rig.b, math.degrees(rig.slope))),
+                 _verdict(trial))
         rows.append(''.join(f'<td>{cell}</td>' for cell in cells))
     return '<table>' + '\n'.join(f'<tr>{row}</tr>' for row in rows) + '</table>'
 
@@ -160,6 +160,7 @@ def _axes() -> tuple[Any, Any]:
     axes = figure.subplots()
     axes.spines[['top', 'right']].set_visible(False)
     axes.margins(x=0.01)
+    axes.locator_params(axis='x', integer=True)
     return figure, axes
 
 
@@ -177,3 +178,7 @@ def _inline(svg: str) -> str:
 
 def _number(value: float, digits: int) -> str:
     return '–' if math.isnan(value) else f'{value:.{digits}f}'
+
+
+def _short(value: float) -> str:
+    return '–' if math.isnan(value) else f'{value:.4g}'

@@ -116,9 +116,8 @@ class _Path(NamedTuple):
     def fit(self, alpha: float, zero: float) -> tuple[Complexes, Complexes]:
         """Coefficients and residuals of hub = start + scale · path(ψ + zero) + off · exp(−iψ), by least squares."""
         terms = np.stack((np.ones_like(self.hub), rolled_path(alpha, self.psi + zero), np.exp(-1j * self.psi)), axis=1)
-        coefficients: Complexes = np.linalg.lstsq(terms, self.hub, rcond=None)[0]
-        residuals: Complexes = self.hub - terms @ coefficients
-        return coefficients, residuals
+        coefficients = np.asarray(np.linalg.lstsq(terms, self.hub, rcond=None)[0], np.complex128)
+        return coefficients, np.asarray(self.hub - terms @ coefficients, np.complex128)
 
     def misfit(self, alpha: float, zero: float) -> float:
         """Root mean square of the residuals [m]."""

@@ -5,13 +5,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from trials import ROOT, STIFF
 
-ROOT = Path(__file__).parent.parent.parent
 sys.path.insert(0, str(ROOT / 'tests' / 'ros'))
 
-from bench import Bench  # noqa: E402
-
-STIFF = '/**:\n  ros__parameters:\n    k: 60\n    rate: 200\n'
+from bench import Bench
 
 
 @pytest.fixture

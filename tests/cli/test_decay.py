@@ -27,3 +27,7 @@ def test_what_does_not_decay_has_no_ratio(errors):
 def test_noise_shifts_it_little():
     noise = np.random.default_rng(0).normal(scale=0.3, size=40)
     assert fit_decay(3.0 - 28.0 * 0.94 ** np.arange(40) + noise).ratio == pytest.approx(0.94, abs=0.01)
+
+
+def test_a_straight_line_tends_to_nothing():
+    assert math.isnan(fit_decay([-28.4, -27.3, -26.2, -25.1, -24.0, -22.9]).ratio)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from bags import joint_state, write_bag
-from conftest import ROOT
+from trials import ROOT
 
 from dcdrw.cli import main
 from dcdrw.recording import Recording

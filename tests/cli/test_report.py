@@ -78,6 +78,7 @@ def test_tables_hold_every_number(report):
     assert live['synchronized'] == 'True'
     assert float(live['k']) == 60.0
     assert live['note'].startswith('first')
+    assert (bag['k'], bag['b'], bag['slope_deg']) == ('', '', ''), 'nobody has told them'
     # The paper's rig, whose error a step multiplies by 0.9411 (the largest multiplier).
     assert float(bag['contraction_per_step']) == pytest.approx(0.94, abs=0.02)
     steps = [step for step in rows(report, 'steps.csv') if step['trial'] == 'bag' and step['wheel'] == 'front']

@@ -159,7 +159,7 @@ def test_sliders_and_buttons_act_through_the_nodes(bench, live, chromium, tmp_pa
     click(tab, 'pause')
     bench.wait(lambda: joints[-1].velocity[0] == 0.0, 'a pause')
     tab.wait("document.getElementById('pause').textContent === 'Go on'")
-    assert text(tab, 'detail') == 'paused: the wheels are held'
+    tab.wait("document.getElementById('detail').textContent === 'paused: the wheels are held'")
     click(tab, 'pause')
     bench.wait(lambda: joints[-1].velocity[0] > 0.0, 'the end of the pause')
     turned = joints[-1].position[0]
