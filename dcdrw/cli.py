@@ -24,6 +24,7 @@ from dcdrw import (
     urdf,
 )
 from dcdrw import map as return_map
+from dcdrw.executables import EXECUTABLES
 
 _DESCRIPTION = 'Two rimless wheels on a slope, joined by a spring and a damper: simulate them, run and judge trials.'
 _EPILOG = """\
@@ -47,8 +48,7 @@ examples:
   dcdrw track trial.mp4 --camera camera.yaml --rig calibrated.yaml --out trials/first
   dcdrw simulate case.json --strikes strikes.json --trajectory motion.csv --rate 200
 
-nodes are run by `ros2 run dcdrw NAME`: simulator, phase_estimator, sync_monitor, rig_markers
-"""
+nodes are run by `ros2 run dcdrw NAME`: """ + ', '.join(node.name for node in EXECUTABLES)
 _COMMANDS = (
     trial, live, record, replay, analyze, report, film, tag_sheet, track, calibrate, design, sweep, figures, regimes,
     return_map, models, simulate, urdf)
