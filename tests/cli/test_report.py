@@ -10,7 +10,7 @@ from bags import joint_state, write_bag
 
 from dcdrw.cli import main
 from dcdrw_msgs_py.rig import RigParams
-from dcdrw_sim.start import start_state
+from dcdrw_sim.simulator import SimulatorParams
 from dcdrw_sim.trajectory import run
 
 RATE = 100
@@ -19,8 +19,8 @@ SECONDS = 12.0
 
 def measured_bag(folder, phase, names=('front_wheel', 'rear_wheel')):
     """A bag as a rig's own tracker fills it: no coupler, no parameters."""
-    rig = RigParams().resolved()
-    motion = run(rig, start_state(rig, phase), SECONDS, 1000)
+    rig, state = SimulatorParams(initial_phase_percent=100.0 * phase).start(RigParams())
+    motion = run(rig, state, SECONDS, 1000)
     times = np.arange(0.0, SECONDS, 1.0 / RATE)
     trajectory = motion.at(times)
     stamps = 10**18 + (times * 1e9).astype(int)
