@@ -48,7 +48,8 @@ examples:
   dcdrw track trial.mp4 --camera camera.yaml --rig calibrated.yaml --out trials/first
   dcdrw simulate case.json --strikes strikes.json --trajectory motion.csv --rate 200
 
-nodes are run by `ros2 run dcdrw NAME`: """ + ', '.join(node.name for node in EXECUTABLES)
+nodes, each run by `ros2 run dcdrw NAME`:
+  """ + ', '.join(node.name for node in EXECUTABLES)
 _COMMANDS = (
     trial, live, record, replay, analyze, report, film, tag_sheet, track, calibrate, design, sweep, figures, regimes,
     return_map, models, simulate, urdf)

@@ -101,8 +101,10 @@ def test_wrong_input_is_told_in_one_line(tmp_path, monkeypatch, capsys, argument
 
 
 def test_help_reads_well(capsys):
-    for arguments in (['--help'], ['simulate', '--help'], ['trial', '--help']):
+    commands = ('trial live record replay analyze report film tags track calibrate design sweep figures regimes map '
+                'models simulate urdf')
+    for command in ('', *commands.split()):
         with pytest.raises(SystemExit) as ended:
-            main(arguments)
+            main([*filter(None, [command]), '--help'])
         assert ended.value.code == 0
         assert max(map(len, capsys.readouterr().out.splitlines())) <= 120
