@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from dcdrw.analysis import Analysis, Floats
+from dcdrw.canvas import new_figure
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND
 
@@ -22,13 +23,7 @@ def draw_trial(trial: Analysis, title: str, path: Path) -> None:
         ValueError: matplotlib is not installed.
 
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise ValueError('a picture needs matplotlib: pip install matplotlib') from None
-    figure = Figure(figsize=(10, 9), layout='constrained')
-    FigureCanvasAgg(figure)
+    figure = new_figure(10, 9)
     angles, phase, gait, force = figure.subplots(4, 1, sharex=True, height_ratios=(3, 3, 1.3, 2))
     time = trial.motion.seconds
     _draw_angles(angles, trial, time)

@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import dcdrw_sim
+from dcdrw.canvas import new_figure
+from dcdrw.sweep import Bar
 from dcdrw_sim import model_figures, regime_figures, sweep_figures
 from dcdrw_sim.basin import SECONDS, basin, least_speeds
 from dcdrw_sim.presets import preset
@@ -18,7 +20,7 @@ from dcdrw_sim.return_map import ReturnMap
 from dcdrw_sim.simulator import SimulatorParams
 from dcdrw_sim.sweep import POINTS, RANGES, Axis, Sweep, papers_sweep
 from dcdrw_sim.sweep_dataset import open_sweep, require_extra
-from dcdrw_sim.sweep_run import Progress, is_complete, run_sweep
+from dcdrw_sim.sweep_run import is_complete, run_sweep
 
 PAPERS_RIG, PAPERS_SWEEP = preset('paper'), preset('paper-sweep')
 PRELOADED = PAPERS_SWEEP._replace(D0=PAPERS_SWEEP.resolved().S0)
@@ -53,7 +55,7 @@ class Book(NamedTuple):
         """The Dataset of a sweep, computed unless it is kept already."""
         path = self.cache / f'{name}-{_key(sweep)}.nc'
         if not is_complete(path, sweep):
-            with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as executor, _Bar(name) as bar:
+            with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as executor, Bar(name) as bar:
                 try:
                     run_sweep(sweep, path, executor, len(os.sched_getaffinity(0)) + 1, bar)
                 except KeyboardInterrupt:
@@ -85,7 +87,7 @@ def add_command(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     require_extra('xarray', 'netCDF4', 'dask.array', 'tqdm')
-    _figure(1, 1)
+    new_figure(1, 1, 'a figure')
     options.out.mkdir(parents=True, exist_ok=True)
     book = Book(options.cache or _default_cache(), options.quick)
     book.cache.mkdir(parents=True, exist_ok=True)
@@ -98,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _trajectories(book: Book) -> Any:
     """θ2 at the section of every start of every coupler that converges."""
-    figure = _figure(8, 5)
+    figure = new_figure(8, 5)
     with book.sweep('paper', _paper(book)) as dataset:
         sweep_figures.draw_trajectories(figure.subplots(), dataset)
     return figure
@@ -107,7 +109,7 @@ def _trajectories(book: Book) -> Any:
 def _eigenvalues(book: Book) -> Any:
     """Couplers that converge, with the largest eigenvalue: the paper's way, mended, and exact."""
     from matplotlib.colors import Normalize
-    figure = _figure(12, 8.4)
+    figure = new_figure(12, 8.4)
     rows = (('paper', PAPERS_SWEEP, 'D0 = S0 + ℓ sin α'), ('preloaded', PRELOADED, 'D0 = S0'))
     for line, (name, rig, title) in zip(figure.subplots(2, 3, sharex=True, sharey=True), rows, strict=True):
         with book.sweep(name, _paper(book)._replace(rig=rig)) as dataset:
@@ -121,7 +123,7 @@ def _eigenvalues(book: Book) -> Any:
 
 def _best(book: Book) -> Any:
     """The best coupler's motions, and what the regressions predict."""
-    figure = _figure(12, 4.6)
+    figure = new_figure(12, 4.6)
     with book.sweep('paper', _paper(book)) as dataset:
         for axes, form in zip(figure.subplots(1, 2, sharex=True, sharey=True), ('raw', 'affine'), strict=True):
             sweep_figures.draw_best(axes, dataset, form)
@@ -131,7 +133,7 @@ def _best(book: Book) -> Any:
 
 def _experiment(book: Book) -> Any:
     """The paper's experiment in simulation: 5 s from 21.6 %."""
-    figure = _figure(8, 5.5)
+    figure = new_figure(8, 5.5)
     rig, start = SimulatorParams().start(PAPERS_RIG)
     angles, phase = figure.subplots(2, 1, sharex=True)
     sweep_figures.draw_experiment(angles, phase, rig, start, EXPERIMENT_SECONDS, EXPERIMENT_BAND)
@@ -141,7 +143,7 @@ def _experiment(book: Book) -> Any:
 
 def _regimes(book: Book) -> Any:
     """What becomes of a pair over stiffness and damping, and over slope and damping."""
-    figure = _figure(14, 6.4)
+    figure = new_figure(14, 6.4)
     coupler, preloaded, slope = figure.subplots(1, 3)
     for axes, name, rig, title in ((coupler, 'paper-long', PAPERS_SWEEP, 'D0 = S0 + ℓ sin α: at rest at φ = α'),
                                    (preloaded, 'preloaded-long', PRELOADED, 'D0 = S0: preloaded')):
@@ -163,7 +165,7 @@ def _regimes(book: Book) -> Any:
 
 def _basin(book: Book) -> Any:
     """From which phases and speeds a pair comes into step, with a coupler on either side of the stall band."""
-    figure = _figure(12, 4.8)
+    figure = new_figure(12, 4.8)
     points = book.points(100)
     for axes, (k, b) in zip(figure.subplots(1, 2, sharey=True), BASINS, strict=True):
         rig = PAPERS_SWEEP._replace(k=k, b=b)
@@ -177,7 +179,7 @@ def _basin(book: Book) -> Any:
 
 def _pair(book: Book) -> Any:
     """Mean speed and energy lost per metre against the phase, of the pair with a rigid bar."""
-    figure = _figure(12, 4.8)
+    figure = new_figure(12, 4.8)
     speed, energy = figure.subplots(1, 2)
     rig, cycle = PAPERS_RIG.resolved(), ReturnMap(PAPERS_RIG)
     fixed = cycle.fixed_point()
@@ -209,34 +211,3 @@ def _key(sweep: Sweep) -> str:
 
 def _default_cache() -> Path:
     return Path(os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache') / 'dcdrw'
-
-
-class _Bar:
-    """A progress bar with the rate, on a terminal only."""
-
-    def __init__(self, name: str) -> None:
-        from tqdm import tqdm
-        self._bar = tqdm(desc=name, unit=' points', disable=None)
-
-    def __enter__(self) -> '_Bar':
-        return self
-
-    def __call__(self, progress: Progress) -> None:
-        if self._bar.total is None:
-            self._bar.reset(progress.total)
-            self._bar.initial = progress.points
-        self._bar.update(progress.points - self._bar.n)
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.close()
-
-
-def _figure(width: float, height: float) -> Any:
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise ValueError('a figure needs matplotlib: pip install matplotlib') from None
-    figure = Figure(figsize=(width, height), layout='constrained')
-    FigureCanvasAgg(figure)
-    return figure

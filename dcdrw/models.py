@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from dcdrw.canvas import new_figure
 from dcdrw.parameter_file import add_rig_options, chosen_params
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelParams
@@ -44,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     rig = chosen_params(options).rig.resolved()
     if options.out:
-        _figure(1, 1)
+        new_figure(1, 1)
         options.out.mkdir(parents=True, exist_ok=True)
     found = record(rig)
     print('\n'.join(report(found)))
@@ -199,7 +200,7 @@ def draw(rig: RigParams, found: dict[str, Any], folder: Path) -> None:
 
     """
     wheels = {FRONT: rig.front} if rig.front == rig.rear else {FRONT: rig.front, REAR: rig.rear}
-    figure = _figure(11, 5 * len(wheels))
+    figure = new_figure(11, 5 * len(wheels))
     for (name, wheel), (basin, speed) in zip(wheels.items(), figure.subplots(len(wheels), 2, squeeze=False),
                                              strict=True):
         model_figures.draw_basin(basin, wheel, rig.slope, rig.gravity)
@@ -207,29 +208,18 @@ def draw(rig: RigParams, found: dict[str, Any], folder: Path) -> None:
         speed.set_title('a single wheel' if len(wheels) == 1 else f'the {name} wheel by itself')
     figure.savefig(folder / 'wheel.png', dpi=120)
     if 'fastest' in found['rigid_pair']:
-        figure = _figure(11, 4.6)
+        figure = new_figure(11, 4.6)
         speed, energy = figure.subplots(1, 2)
         coupled = found['coupled_pair']
         model_figures.draw_speed(speed, rig, (coupled['phase'], coupled['velocity']) if coupled.get('stable') else None)
         model_figures.draw_energy(energy, rig)
         figure.savefig(folder / 'pair.png', dpi=120)
-    figure = _figure(11, 6)
+    figure = new_figure(11, 6)
     for axes, phase in zip(figure.subplots(2, 2, sharex=True, sharey=True).flat, GAITS, strict=True):
         model_figures.draw_hildebrand(axes, steady_contacts(phase, 2), title=f'p = {100 * phase:.0f} %')
         axes.set_xlim(0.0, 2.0)
         axes.label_outer()
     figure.savefig(folder / 'footfalls.png', dpi=120)
-
-
-def _figure(width: float, height: float) -> Any:
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise ValueError('a picture needs matplotlib: pip install matplotlib') from None
-    figure = Figure(figsize=(width, height), layout='constrained')
-    FigureCanvasAgg(figure)
-    return figure
 
 
 def _known(value: float) -> float | None:

@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     require_extra('xarray', 'netCDF4', 'dask.array', 'tqdm')
     sweep = chosen_sweep(options)
-    with _ended_by_signals(), _executor(options) as (executor, at_once), _Bar() as bar:
+    with _ended_by_signals(), _executor(options) as (executor, at_once), Bar() as bar:
         run_sweep(sweep, options.out, executor, at_once, bar)
     print(f'{options.out}: {summary(options.out)}')
     return 0
@@ -134,17 +134,22 @@ def _cluster(address: str) -> Iterator[tuple[Executor, int]]:
                           ) from None
 
 
-class _Bar:
+class Bar:
     """A progress bar with the rate, on a terminal only."""
 
-    def __enter__(self) -> '_Bar':
+    def __init__(self, name: str | None = None) -> None:
+        self._name = name
+
+    def __enter__(self) -> 'Bar':
         from tqdm import tqdm
         self._make, self._bar = tqdm, None  # type: Any, Any
         return self
 
     def __call__(self, progress: Progress) -> None:
+        """Show how far it is; what earlier runs did does not count for the rate."""
         if self._bar is None:
-            self._bar = self._make(total=progress.total, initial=progress.points, unit=' points', disable=None)
+            self._bar = self._make(
+                desc=self._name, total=progress.total, initial=progress.points, unit=' points', disable=None)
         self._bar.update(progress.points - self._bar.n)
 
     def __exit__(self, *_: object) -> None:

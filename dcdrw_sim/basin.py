@@ -7,7 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.ensemble import spread
-from dcdrw_sim.regimes import bisect, judge_starts, starts
+from dcdrw_sim.points import starts
+from dcdrw_sim.regimes import bisect, judge_starts
 from dcdrw_sim.verdict import Judgement, Verdict
 
 Floats = NDArray[np.float64]
@@ -35,7 +36,7 @@ def basin(rig: RigParams, phases: ArrayLike, speeds: ArrayLike, seconds: float) 
 
     Args:
         rig: the rig; derived defaults are filled in.
-        phases: in steps, shape (P,), as `dcdrw_sim.regimes.starts`.
+        phases: in steps, shape (P,), as `dcdrw_sim.points.starts`.
         speeds: of both wheels, as parts of those of their uncoupled limit cycles, shape (Q,).
         seconds: how long to simulate.
 

@@ -6,7 +6,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_sim.dynamics import limit_cycle_speed
@@ -95,14 +95,28 @@ def _fastest(front: WheelParams, rear: WheelParams, slope: float, gravity: float
     return max(rates)
 
 
+def starts(rig: RigParams, phases: ArrayLike, speeds: ArrayLike = 1.0) -> Floats:
+    """Both wheels on their uncoupled limit cycles, the front one about to strike; shape (..., 4).
+
+    Args:
+        rig: the rig, on a slope on which its wheels roll by themselves.
+        phases: p in [0, 1), in steps: θ2 = α2 (1 − 2 p).
+        speeds: of both wheels, as parts of those of the limit cycles; broadcast against the phases.
+
+    """
+    front, rear = rig.front, rig.rear
+    part, speed = np.broadcast_arrays(np.asarray(phases, float), np.asarray(speeds, float))
+    theta2 = rear.alpha * (1.0 - 2.0 * part)
+    omega1 = limit_cycle_speed(front, rig.slope, rig.gravity) / math.cos(2.0 * front.alpha)
+    omega2 = limit_cycle_speed(rear, rig.slope, rig.gravity, theta2)
+    return np.stack([np.full_like(theta2, front.alpha), omega1 * speed, theta2, omega2 * speed], axis=-1)
+
+
 @lru_cache(maxsize=1024)
 def _start_states(front: WheelParams, rear: WheelParams, slope: float, gravity: float,
                   phases: tuple[float, ...]) -> Floats:
-    """Both wheels on their uncoupled limit cycles, the front one about to strike; shape (starts, 4)."""
-    theta2 = rear.alpha * (1.0 - 2.0 * np.array(phases))
-    omega1 = limit_cycle_speed(front, slope, gravity) / math.cos(2.0 * front.alpha)
-    omega2 = limit_cycle_speed(rear, slope, gravity, theta2)
-    return np.column_stack([np.full_like(theta2, front.alpha), np.full_like(theta2, omega1), theta2, omega2])
+    """As `starts`, shape (starts, 4)."""
+    return starts(RigParams(front, rear, slope=slope, gravity=gravity), phases)
 
 
 def _of_points(judgement: Judgement, starts: int) -> dict[str, NDArray[Any]]:

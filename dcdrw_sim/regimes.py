@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dcdrw_msgs_py.rig import RigParams
-from dcdrw_sim.dynamics import limit_cycle_speed
 from dcdrw_sim.ensemble import Rigs, run_pairs, spread, take
 from dcdrw_sim.even_gait import even_gait_on, even_stall_band, gentlest_even_gait, worst_damping
 from dcdrw_sim.limit_cycles import DIFFERENCE, find_limit_cycles, step_maps
@@ -135,23 +134,6 @@ def steepest_stall(rig: RigParams) -> tuple[float, float]:
             return math.nan, math.nan
         center, width = float(logs[slopes.argmax()]), 2.0 * width / (PEAK_POINTS - 1)
     return scales.damping * math.exp(center), float(slopes.max())
-
-
-def starts(rig: RigParams, phases: ArrayLike, speeds: ArrayLike = 1.0) -> Floats:
-    """Both wheels on their uncoupled limit cycles, the front one about to strike; shape (..., 4).
-
-    Args:
-        rig: the rig, on a slope on which its wheels roll by themselves.
-        phases: p in [0, 1), in steps: θ2 = α2 (1 − 2 p).
-        speeds: of both wheels, as parts of those of the limit cycles; broadcast against the phases.
-
-    """
-    front, rear = rig.front, rig.rear
-    part, speed = np.broadcast_arrays(np.asarray(phases, float), np.asarray(speeds, float))
-    theta2 = rear.alpha * (1.0 - 2.0 * part)
-    omega1 = limit_cycle_speed(front, rig.slope, rig.gravity) / math.cos(2.0 * front.alpha)
-    omega2 = limit_cycle_speed(rear, rig.slope, rig.gravity, theta2)
-    return np.stack([np.full_like(theta2, front.alpha), omega1 * speed, theta2, omega2 * speed], axis=-1)
 
 
 def judge_starts(rigs: Rigs, states: Floats, seconds: float) -> Judgement:

@@ -7,8 +7,8 @@ import pytest
 
 from dcdrw_sim.basin import basin, judge_from, least_speeds
 from dcdrw_sim.dynamics import State
+from dcdrw_sim.points import starts
 from dcdrw_sim.presets import preset
-from dcdrw_sim.regimes import starts
 from dcdrw_sim.rimless_wheel import speed_to_pass
 from dcdrw_sim.scaling import Scales, dimensional
 from dcdrw_sim.strikes import BACKWARD

@@ -9,6 +9,7 @@ from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.dynamics import State, damper_power, gentlest_slope, mechanical_energy
 from dcdrw_sim.ensemble import spread
 from dcdrw_sim.even_gait import even_stall_band, gentlest_even_gait
+from dcdrw_sim.points import starts
 from dcdrw_sim.presets import preset
 from dcdrw_sim.regimes import (
     bisect,
@@ -17,7 +18,6 @@ from dcdrw_sim.regimes import (
     judge_starts,
     stall_bands,
     stall_edges,
-    starts,
     steepest_stall,
 )
 from dcdrw_sim.return_map import ReturnMap
