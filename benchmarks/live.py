@@ -20,9 +20,9 @@ import rclpy
 from aiohttp import ClientSession
 from rclpy.node import Node
 
-from dcdrw.executables import TRIAL
-from dcdrw.live_state import WINDOW_SECONDS
-from dcdrw.processes import free_domain
+from dcdrw.page.live_state import WINDOW_SECONDS
+from dcdrw.suite.executables import TRIAL
+from dcdrw.suite.processes import free_domain
 from dcdrw_msgs_py.node import listen, run
 from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, JOINT_STATES, PHASE_STATE, SYNCHRONIZED
 

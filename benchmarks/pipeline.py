@@ -28,14 +28,14 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Int32
 
-from dcdrw.executables import TRIAL
-from dcdrw.processes import free_domain
+from dcdrw.suite.executables import TRIAL
+from dcdrw.suite.processes import free_domain
 from dcdrw_msgs_py.messages import SECOND, JointSampleReader, JointSampleWriter, PhaseSampleWriter, stamp_ns
 from dcdrw_msgs_py.node import advertise, listen, make_executor, run, steady_clock
 from dcdrw_msgs_py.samples import CouplerSample, JointSample, Turn
 from dcdrw_msgs_py.topics import JOINT_STATES, PHASE_STATE, PHI, STEP_DIFFERENCE, SYNC_ERROR, SYNC_ERROR_PERCENT
-from dcdrw_tracker.phase import PhaseEstimator, PhaseParams
-from dcdrw_tracker.sync import SyncMonitor, SyncParams
+from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams
+from dcdrw_tracker.gait.sync import SyncMonitor, SyncParams
 
 WARM_UP = 3.0
 SUITE = [node.module for node in reversed(TRIAL)]

@@ -24,14 +24,14 @@ from pipeline import SUITE, figures, measure, suite_errors
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
-from dcdrw.analysis import analyze
-from dcdrw.parameter_file import TrialParams
-from dcdrw.processes import free_domain
-from dcdrw.recorder import Recorder, offered_qos
-from dcdrw.recording import JOINT_STATE, Recording
+from dcdrw.recordings.recorder import Recorder, offered_qos
+from dcdrw.recordings.recording import JOINT_STATE, Recording
+from dcdrw.suite.parameter_file import TrialParams
+from dcdrw.suite.processes import free_domain
+from dcdrw.trials.analysis import analyze
 from dcdrw_msgs_py.rig import RigParams
-from dcdrw_sim.simulator import SimulatorParams
-from dcdrw_sim.trajectory import run
+from dcdrw_sim.motion.trajectory import run
+from dcdrw_sim.rig.simulator import SimulatorParams
 
 RATE = 1000
 
@@ -103,7 +103,7 @@ def compare_nodes(rounds: int, seconds: float, rate: float) -> None:
         alone.append(measure(suite, suite_errors, seconds))
         with tempfile.TemporaryDirectory() as temporary:
             folder = Path(temporary) / 'bag'
-            recorder = [sys.executable, '-m', 'dcdrw.recorder_node', '--ros-args', '--log-level', 'warn',
+            recorder = [sys.executable, '-m', 'dcdrw.nodes.recorder_node', '--ros-args', '--log-level', 'warn',
                         '-p', f'folder:={folder}', '-p', 'record:=true']
             beside.append(measure([recorder, *suite], suite_errors, seconds))
             with Recording(folder) as recording:

@@ -16,8 +16,8 @@ import numpy as np
 
 from dcdrw_msgs_py.samples import JointSample, Turn
 from dcdrw_msgs_py.tagging import TagParams
-from dcdrw_sim.render import LookParams, Renderer
-from dcdrw_sim.scene import Footing, SceneParams, ViewParams
+from dcdrw_sim.camera.render import LookParams, Renderer
+from dcdrw_sim.camera.scene import Footing, SceneParams, ViewParams
 
 WARM_UP = 3
 LENS = ViewParams(k1=-0.25, k2=0.06, field_of_view_deg=70.0)

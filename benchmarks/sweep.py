@@ -32,11 +32,11 @@ from typing import Any
 import numpy as np
 import trajectories
 
-from dcdrw_sim import ensemble
-from dcdrw_sim.points import run_starts
-from dcdrw_sim.sweep import Axis, block_size, blocks, compute, papers_sweep, rigs_of, room
-from dcdrw_sim.sweep_run import run_sweep
-from dcdrw_sim.verdict import Verdict, judge
+from dcdrw_sim.motion import ensemble
+from dcdrw_sim.study.points import run_starts
+from dcdrw_sim.study.sweep import Axis, block_size, blocks, compute, papers_sweep, rigs_of, room
+from dcdrw_sim.study.sweep_run import run_sweep
+from dcdrw_sim.study.verdict import Verdict, judge
 
 SWEEP = papers_sweep()
 CORES = len(os.sched_getaffinity(0))

@@ -23,22 +23,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dcdrw.film import Shots
+from dcdrw.commands.film import Shots
 from dcdrw_msgs_py.frame import Picture
 from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
 from dcdrw_msgs_py.samples import JointSample
 from dcdrw_msgs_py.tagging import TagParams, mounts
-from dcdrw_sim.render import LookParams, Renderer
-from dcdrw_sim.scene import Footing, SceneParams, ViewParams
-from dcdrw_sim.simulation import Simulation
-from dcdrw_sim.simulator import SimulatorParams
-from dcdrw_tracker.detector import Detection, TagDetector
-from dcdrw_tracker.phase import PhaseEstimator, PhaseParams
-from dcdrw_tracker.tag_follower import TagFollower
-from dcdrw_tracker.wheel_angles import WheelAngles
-from dcdrw_tracker.wheel_track import TrackParams
-from dcdrw_tracker.wheel_view import PairViewer
+from dcdrw_sim.camera.render import LookParams, Renderer
+from dcdrw_sim.camera.scene import Footing, SceneParams, ViewParams
+from dcdrw_sim.motion.pair import Simulation
+from dcdrw_sim.rig.simulator import SimulatorParams
+from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams
+from dcdrw_tracker.tags.detector import Detection, TagDetector
+from dcdrw_tracker.tags.tag_follower import TagFollower
+from dcdrw_tracker.tags.wheel_view import PairViewer
+from dcdrw_tracker.wheels.wheel_angles import WheelAngles
+from dcdrw_tracker.wheels.wheel_track import TrackParams
 
 RIG, TAGS = RigParams(), TagParams()
 RATE = 60.0

@@ -32,12 +32,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from dcdrw_sim import simulation, trajectory
-from dcdrw_sim.compiled import AVAILABLE
-from dcdrw_sim.dynamics import State, limit_cycle_speed
-from dcdrw_sim.ensemble import run_ensemble
-from dcdrw_sim.presets import preset
-from dcdrw_sim.strikes import BACKWARD, End
+from dcdrw_sim.model.dynamics import State, limit_cycle_speed
+from dcdrw_sim.model.presets import preset
+from dcdrw_sim.motion import pair as simulation
+from dcdrw_sim.motion import trajectory
+from dcdrw_sim.motion.compiled import AVAILABLE
+from dcdrw_sim.motion.ensemble import run_ensemble
+from dcdrw_sim.motion.strikes import BACKWARD, End
 
 SCIPY_TOLERANCE = 3e-13
 TAYLOR_TOLERANCE = 1e-13  # of the simulation and of the ensemble

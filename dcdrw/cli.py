@@ -4,7 +4,7 @@ import argparse
 import sys
 from importlib.metadata import PackageNotFoundError, version
 
-from dcdrw import (
+from dcdrw.commands import (
     analyze,
     calibrate,
     design,
@@ -16,6 +16,7 @@ from dcdrw import (
     regimes,
     replay,
     report,
+    return_map,
     simulate,
     sweep,
     tag_sheet,
@@ -23,8 +24,7 @@ from dcdrw import (
     trial,
     urdf,
 )
-from dcdrw import map as return_map
-from dcdrw.executables import EXECUTABLES
+from dcdrw.suite.executables import EXECUTABLES
 
 _DESCRIPTION = 'Two rimless wheels on a slope, joined by a spring and a damper: simulate them, run and judge trials.'
 _EPILOG = """\

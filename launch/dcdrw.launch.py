@@ -9,8 +9,8 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import ExecutableInPackage, FindPackageShare
 
-from dcdrw.parameter_file import TrialParams, read_parameter_file
-from dcdrw.urdf import make_urdf
+from dcdrw.commands.urdf import make_urdf
+from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 
 SOURCES = ('sim', 'rig', 'recording')
 SWITCH = ('true', 'false')

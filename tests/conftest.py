@@ -1,5 +1,35 @@
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
 from hypothesis import settings
+
+from tests import ROOT
+from tests.bench import Bench
+from tests.trials import STIFF
 
 # A busy machine is no counterexample.
 settings.register_profile('patient', deadline=None)
 settings.load_profile('patient')
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    bench = Bench(tmp_path)
+    yield bench
+    bench.close()
+
+
+@pytest.fixture(scope='session')
+def live_trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a trial that was run live: 200 Hz, in step within its 5 s."""
+    folder = tmp_path_factory.mktemp('trial')
+    (folder / 'rig.yaml').write_text(STIFF)
+    subprocess.run(
+        [sys.executable, '-m', 'dcdrw.cli', 'trial', '--rig', 'rig.yaml', '--initial-phase', '35', '--seconds', '5',
+         '--note', 'first: "with" new springs', '--quiet', '--out', 'out'],
+        cwd=folder, env={**os.environ, 'PYTHONPATH': str(ROOT)}, check=True, timeout=120, stdout=subprocess.DEVNULL)
+    return folder / 'out'

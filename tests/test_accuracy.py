@@ -6,9 +6,9 @@ import numpy as np
 
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
 from dcdrw_msgs_py.samples import JointSample, Turn
-from dcdrw_sim.simulator import SimulatorParams
-from dcdrw_sim.trajectory import run
-from dcdrw_tracker.phase import PhaseEstimator, PhaseParams
+from dcdrw_sim.motion.trajectory import run
+from dcdrw_sim.rig.simulator import SimulatorParams
+from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams
 
 TRIALS, SECONDS, RATE = 100, 30.0, 200.0
 NOISE, LOST = math.radians(0.2), 0.05

@@ -1,18 +1,16 @@
 """The docs say what the code does."""
 
-from pathlib import Path
 
 import pytest
 
-from dcdrw.parameter_file import TrialParams, read_parameter_file
-from dcdrw.tables import updated
-
-ROOT = Path(__file__).parent.parent
+from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
+from dcdrw.suite.tables import updated
+from tests import ROOT
 
 
 def test_tables_of_the_readme_are_current():
     text = (ROOT / 'README.md').read_text(encoding='utf-8')
-    assert updated(text) == text, 'run: python -m dcdrw.tables README.md'
+    assert updated(text) == text, 'run: python -m dcdrw.suite.tables README.md'
 
 
 def test_a_table_without_a_place_is_told():

@@ -2,14 +2,13 @@
 
 import ast
 import runpy
-from pathlib import Path
 
 import pytest
 
 from dcdrw import cli
-from dcdrw.executables import EXECUTABLES, TRIAL
+from dcdrw.suite.executables import EXECUTABLES, TRIAL
+from tests import ROOT
 
-ROOT = Path(__file__).parent.parent
 FILES = sorted((ROOT / 'launch').glob('*.launch.py'))
 COMPOSITION = ROOT / 'launch' / 'dcdrw.launch.py'
 NAMES = {node.name for node in EXECUTABLES}

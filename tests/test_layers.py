@@ -3,11 +3,11 @@
 import ast
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+from tests import ROOT
+
 PACKAGES = ('dcdrw_msgs_py', 'dcdrw_sim', 'dcdrw_tracker', 'dcdrw')
 ALLOWED = {
     'dcdrw_msgs_py': set(),
@@ -15,10 +15,10 @@ ALLOWED = {
     'dcdrw_tracker': {'dcdrw_msgs_py'},
     'dcdrw': {'dcdrw_msgs_py', 'dcdrw_sim', 'dcdrw_tracker'},
 }
-KNOW_ROS = {'dcdrw_msgs_py.node', 'dcdrw_msgs_py.messages', 'dcdrw_msgs_py.image_messages', 'dcdrw.observer'}
+KNOW_ROS = {'dcdrw_msgs_py.node', 'dcdrw_msgs_py.messages', 'dcdrw_msgs_py.image_messages', 'dcdrw.nodes.observer'}
 MODULES = [
     '.'.join(path.relative_to(ROOT).with_suffix('').parts)
-    for package in PACKAGES for path in sorted((ROOT / package).glob('*.py')) if path.stem != '__init__']
+    for package in PACKAGES for path in sorted((ROOT / package).rglob('*.py')) if path.stem != '__init__']
 CORES = [module for module in MODULES if module not in KNOW_ROS and not module.endswith('_node')]
 
 BLOCK_ROS = """
@@ -34,7 +34,7 @@ sys.meta_path.insert(0, Blocked())
 
 @pytest.mark.parametrize('package', PACKAGES)
 def test_imports_point_one_way(package):
-    for path in (ROOT / package).glob('*.py'):
+    for path in (ROOT / package).rglob('*.py'):
         for node in ast.walk(ast.parse(path.read_text())):
             names = ([alias.name for alias in node.names] if isinstance(node, ast.Import)
                      else [node.module or ''] if isinstance(node, ast.ImportFrom) else [])

@@ -11,9 +11,9 @@ from xml.etree import ElementTree
 
 import pytest
 
-from dcdrw.executables import EXECUTABLES
+from dcdrw.suite.executables import EXECUTABLES
+from tests import ROOT
 
-ROOT = Path(__file__).parent.parent
 PACKAGES = ('dcdrw_msgs_py', 'dcdrw_sim', 'dcdrw_tracker', 'dcdrw')
 COMMANDS = {'dcdrw', *(node.name for node in EXECUTABLES)}
 # Third-party modules and the package.xml key (rosdep) that brings each.
@@ -36,7 +36,7 @@ def manifest() -> ElementTree.Element:
 def imported() -> set[str]:
     """Top-level names that the packages and launch files import."""
     names: set[str] = set()
-    for path in [*(path for package in PACKAGES for path in (ROOT / package).glob('*.py')), *ROOT.glob('launch/*.py')]:
+    for path in [*(path for package in PACKAGES for path in (ROOT / package).rglob('*.py')), *ROOT.glob('launch/*.py')]:
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Import):
                 names |= {alias.name.split('.')[0] for alias in node.names}

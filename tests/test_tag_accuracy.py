@@ -1,12 +1,9 @@
 """The goals of `benchmarks/tags.py`, but for speed, on short films."""
 
-import sys
-from pathlib import Path
 
 import pytest
 
 pytest.importorskip('cv2')
-sys.path.insert(0, str(Path(__file__).parents[1] / 'benchmarks'))
 
 from tags import CASES, HALF_A_FRAME, track, tracker
 

@@ -5,7 +5,7 @@ import math
 from hypothesis import strategies as st
 
 from dcdrw_msgs_py.rig import RigParams, WheelParams
-from dcdrw_sim.dynamics import State
+from dcdrw_sim.model.dynamics import State
 
 UNEQUAL = RigParams(WheelParams(0.95, 9.0, 12), WheelParams(1.05, 11.0, 13), k=20.0, b=30.0, slope=math.radians(2.5))
 UNCOUPLED = RigParams(k=0.0, b=0.0)

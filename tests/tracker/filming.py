@@ -5,10 +5,10 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from walking import ALPHA, PITCH, START_NS, Walk
 
 from dcdrw_msgs_py.rig import WheelShape
-from dcdrw_tracker.wheel_view import PairView, WheelView
+from dcdrw_tracker.tags.wheel_view import PairView, WheelView
+from tests.tracker.walking import ALPHA, PITCH, START_NS, Walk
 
 Array = NDArray[np.float64]
 Hidden = Callable[[Array], NDArray[np.bool_]]

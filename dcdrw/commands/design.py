@@ -1,0 +1,333 @@
+"""`dcdrw design`: which spring and which dashpot to buy for a rig, and what if they are not what they say."""
+
+import argparse
+import csv
+import json
+import math
+import sys
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dcdrw.arguments import count, number, positive
+from dcdrw.drawings.design_card import draw_card
+from dcdrw.suite.parameter_file import add_rig_options, chosen_params
+from dcdrw_msgs_py.quantity import build, flatten
+from dcdrw_msgs_py.rig import RigParams
+from dcdrw_sim.model.scaling import nondimensional
+from dcdrw_sim.study.design import (
+    CASES,
+    GRID,
+    TOLERANCE,
+    VARIED,
+    WIDEST,
+    WORK,
+    Assessment,
+    Margin,
+    Task,
+    Variation,
+    assess,
+    forgiving_order,
+    mesh,
+    score,
+    search,
+)
+from dcdrw_sim.study.sweep import default_seconds
+from dcdrw_tracker.gait.sync import SyncParams
+
+STIFFNESS = 1e-4, 1.0
+"""What is searched by default, without dimensions."""
+DAMPING = 1e-2, 1e2
+MOST_PARTS = 20_000
+"""Pairs of parts that are judged in minutes."""
+FASTEST, FORGIVING, GIVEN = 'fastest', 'most forgiving', 'given'
+
+_EPILOG = """\
+Steps are those of the front wheel until the error at its strikes stays within the band, from the worst of nine initial
+phases. The fastest coupler needs fewest. The most forgiving needs fewest where k and b are each off by the tolerance
+either way and the slope is a tenth gentler than thought: where parts are bought by their data sheets, take this one.
+
+--available takes a table with a header: kind,value,name, a row for each part; kind is spring (value in N/m) or dashpot
+(value in N·s/m); name may be left out. Every pair of them is judged, in the place of the search.
+
+examples:
+  dcdrw design                                            for the paper's rig
+  dcdrw design --mass 12 --length 0.9 --slope-deg 2.5 --out design
+  dcdrw design --available parts.csv --out design         the best pair among those on sale
+  dcdrw design --k 5.25 --b 100                           judge a coupler beside the best ones
+"""
+
+
+class Part(NamedTuple):
+    """A spring or a dashpot on sale."""
+
+    kind: str
+    value: float
+    """[N/m] or [N·s/m]"""
+    name: str
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        'design', help='choose spring and dashpot for a rig', epilog=_EPILOG,
+        description='Find the coupler that synchronizes a rig fastest, and the one that forgives most.',
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    add_rig_options(parser)
+    rig = parser.add_argument_group('the rig, in place of the preset\'s or the file\'s')
+    rig.add_argument('--mass', type=positive, metavar='KG', help='of each wheel')
+    rig.add_argument('--length', type=positive, metavar='M', help='of each wheel, hub to foot')
+    rig.add_argument('--spokes', type=count, metavar='N', help='of each wheel')
+    rig.add_argument('--slope-deg', type=number, metavar='DEG')
+    coupler = parser.add_argument_group('the coupler')
+    for name, unit in (('k', 'N/m'), ('b', 'N·s/m')):
+        coupler.add_argument(f'--{name}-min', type=positive, metavar=unit, help=argparse.SUPPRESS)
+        coupler.add_argument(f'--{name}-max', type=positive, metavar=unit, help=f'search no further (and --{name}-min)')
+    coupler.add_argument('--available', type=Path, metavar='PARTS.csv', help='choose among these parts')
+    coupler.add_argument('--k', type=positive, metavar='N/m', help='judge this one, too; with --b')
+    coupler.add_argument('--b', type=positive, metavar='N·s/m')
+    coupler.add_argument('--tolerance', type=positive, default=100.0 * TOLERANCE, metavar='PERCENT',
+                         help='what k and b may be off by (default: %(default)g)')
+    parser.add_argument('--band', type=positive, default=SyncParams().band_percent, metavar='PERCENT',
+                        help='in step is within ± this of 50 %% (default: %(default)g, the monitor\'s)')
+    parser.add_argument('--out', type=Path, metavar='DIR', help='write card.pdf, card.png and design.json there')
+    parser.set_defaults(run=run, prog='dcdrw design')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command; returns the exit status."""
+    if (options.k is None) != (options.b is None):
+        raise ValueError('give --k and --b together')
+    if not options.tolerance < 100.0:
+        raise ValueError(f'--tolerance must be below 100 %, got {options.tolerance:g}')
+    if not options.band < 50.0:
+        raise ValueError(f'--band must be below 50 %, got {options.band:g}')
+    task = _task(options)
+    tolerance = options.tolerance / 100.0
+    parts = read_parts(options.available) if options.available else []
+    if options.out:
+        options.out.mkdir(parents=True, exist_ok=True)
+    with _Progress() as progress:
+        k, b = _bounds(options, task.rig)
+        if parts:
+            grid = score(task, *mesh(k, b), report=progress.among(GRID**2))
+            pairs = _best_parts(task, parts, tolerance, progress)
+        else:
+            grid, *pairs = search(task, k, b, tolerance, progress.among(WORK))
+    chosen = {name: assess(task, *pair, tolerance) for name, pair in zip((FASTEST, FORGIVING), pairs, strict=True)}
+    if options.k:
+        chosen[GIVEN] = assess(task, options.k, options.b, tolerance)
+    print('\n'.join(report(task, chosen, parts, tolerance)))
+    if options.out:
+        content = json.dumps(record(task, chosen, parts, tolerance), indent=1, ensure_ascii=False)
+        (options.out / 'design.json').write_text(content + '\n', encoding='utf-8')
+        for name in ('card.pdf', 'card.png'):
+            draw_card(_rig_line(task), _texts(task, chosen, parts, tolerance), task, grid, chosen, parts,
+                      options.out / name)
+        print(f'\nThe card and all numbers are in {options.out}.')
+    return 0
+
+
+def read_parts(path: Path) -> list[Part]:
+    """Read a table of parts.
+
+    Raises:
+        ValueError: it is none, has a row that makes no sense, or lacks springs or dashpots.
+        OSError: it cannot be read.
+
+    """
+    with path.open(encoding='utf-8-sig', newline='') as file:
+        rows = csv.DictReader(file)
+        if not {'kind', 'value'} <= set(rows.fieldnames or ()):
+            raise ValueError(f'{path} must begin with the header kind,value,name, got {rows.fieldnames}')
+        parts = [_part(row, f'{path}, line {rows.line_num}') for row in rows]
+    for kind in ('spring', 'dashpot'):
+        if not any(part.kind == kind for part in parts):
+            raise ValueError(f'{path} has no {kind}')
+    if len(_of(parts, 'spring')) * len(_of(parts, 'dashpot')) > MOST_PARTS:
+        raise ValueError(f'{path} makes more than {MOST_PARTS} pairs: leave out what is out of the question')
+    return parts
+
+
+def _part(row: dict[str, Any], place: str) -> Part:
+    kind = (row['kind'] or '').strip().lower()
+    if kind not in ('spring', 'dashpot'):
+        raise ValueError(f'{place}: kind must be spring or dashpot, got {row["kind"]!r}')
+    try:
+        value = positive((row['value'] or '').strip())
+    except argparse.ArgumentTypeError as error:
+        raise ValueError(f'{place}: value {error}') from None
+    return Part(kind, value, (row.get('name') or '').strip())
+
+
+def _of(parts: list[Part], kind: str) -> list[Part]:
+    return [part for part in parts if part.kind == kind]
+
+
+def _task(options: argparse.Namespace) -> Task:
+    rig = chosen_params(options).rig
+    values = flatten(rig)
+    for name in ('mass', 'length', 'spokes'):
+        if (value := getattr(options, name)) is not None:
+            values |= {f'front.{name}': value, f'rear.{name}': value}
+    if options.slope_deg is not None:
+        values['slope'] = math.radians(options.slope_deg)
+    rig = build(RigParams, values)
+    # At a front wheel's strike p is 1/2 − θ2/2α2.
+    return Task(rig, default_seconds(rig), options.band / 100.0 * 2.0 * rig.rear.alpha)
+
+
+def _bounds(options: argparse.Namespace, rig: RigParams) -> Iterator[tuple[float, float]]:
+    scales = nondimensional(rig)[1]
+    for name, unit, (least, most) in (('k', scales.stiffness, STIFFNESS), ('b', scales.damping, DAMPING)):
+        high = getattr(options, f'{name}_max') or unit * most
+        low = getattr(options, f'{name}_min') or min(unit * least, high)
+        if low > high:
+            raise ValueError(f'--{name}-min {low:g} is above --{name}-max {high:g}')
+        yield low, high
+
+
+def _best_parts(task: Task, parts: list[Part], tolerance: float, progress: '_Progress') -> list[tuple[float, float]]:
+    ks, bs = (np.array(column) for column in zip(*product(
+        (part.value for part in _of(parts, 'spring')), (part.value for part in _of(parts, 'dashpot'))), strict=True))
+    first = score(task, ks, bs, report=progress.among(len(ks))).order()[0]
+    near = forgiving_order(task, ks, bs, tolerance, progress.among(len(ks) * CASES))[0]
+    return [(float(ks[index]), float(bs[index])) for index in (first, near)]
+
+
+def report(task: Task, chosen: dict[str, Assessment], parts: list[Part], tolerance: float) -> Iterator[str]:
+    """Lines for a person."""
+    yield _rig_line(task)
+    yield f'In step: within ±{_percent_of(task, task.band):g} % of 50 %, from the worst of {len(task.phases)} starts.'
+    for name, found in chosen.items():
+        yield ''
+        yield f'{name:<16} {_coupler(task, found, parts)}'
+        for heading, content in told(task, found, tolerance):
+            yield f'  {heading:<14} {content}'
+
+
+def told(task: Task, found: Assessment, tolerance: float) -> Iterator[tuple[str, str]]:
+    """What there is to say of a coupler: headings and contents."""
+    if math.isnan(found.worst_steps):
+        settling = sum(not math.isnan(steps) for steps in found.steps)
+        yield 'steps', f'{settling} of {len(found.steps)} starts come into step; the worst: {found.verdict.meaning}'
+    else:
+        yield 'steps', f'{found.worst_steps:.0f} from the worst start, {found.time:.1f} s'
+    yield 'from each', ' '.join(f'{100 * phase:.0f} %: {_number(steps)}' for phase, steps in
+                                zip(task.phases, found.steps, strict=True))
+    if not math.isnan(found.multiplier):
+        yield 'limit cycle', (f'{50.0 - _percent_of(task, found.cycle_theta2):.1f} % at {found.speed:.3f} m/s; '
+                              f'a step leaves {100 * found.multiplier:.1f} % of a small error; '
+                              f'the damper takes {found.damper_loss:.2f} J/m')
+    yield 'margins', '; '.join(f'{name} {_margin(margin)}' for name, margin in found.margins.items())
+    slope = found.margins['slope']
+    yield 'gentlest slope', (f'{math.degrees(slope.low * task.rig.slope):.2f}°'
+                             + (f'; on a gentler one: {slope.low_verdict.meaning}' if slope.low_verdict else ''))
+    off = f'{100 * tolerance:.0f} %'
+    by_name = {(variation.parameter, variation.factor < 1.0): variation for variation in found.sensitivity}
+    yield f'if {off} off', '; '.join(
+        f'{name} less: {_outcome(by_name[name, True])}, more: {_outcome(by_name[name, False])}' for name in VARIED)
+
+
+def _texts(task: Task, chosen: dict[str, Assessment], parts: list[Part], tolerance: float) -> dict[str, str]:
+    """The card's words."""
+    return {name: '\n'.join([f'{name.upper()}   {_coupler(task, found, parts)}', *(
+        f'{heading}: {content}' for heading, content in told(task, found, tolerance) if heading != 'from each')])
+        for name, found in chosen.items()}
+
+
+def record(task: Task, chosen: dict[str, Assessment], parts: list[Part], tolerance: float) -> dict[str, Any]:
+    """Everything for a program; SI units and radians but where a name says otherwise; null where there is none."""
+    scales = nondimensional(task.rig)[1]
+    return {
+        'parameters': {name: value for name, value in flatten(task.rig.resolved()).items() if name not in ('k', 'b')},
+        'task': {'seconds': task.seconds, 'band_percent': _percent_of(task, task.band), 'tolerance': tolerance,
+                 'starts_percent': [100.0 * phase for phase in task.phases]},
+        'couplers': {name.replace(' ', '_'): {
+            'k': found.k, 'b': found.b, 'k_nondimensional': found.k / scales.stiffness,
+            'b_nondimensional': found.b / scales.damping,
+            **({'spring': _named(parts, 'spring', found.k), 'dashpot': _named(parts, 'dashpot', found.b)}
+               if parts and name != GIVEN else {}),
+            'verdict': found.verdict.name.lower(), 'worst_steps': _known(found.worst_steps),
+            'worst_time': _known(found.time), 'steps': [_known(steps) for steps in found.steps],
+            'phase_percent': _known(50.0 - _percent_of(task, found.cycle_theta2)),
+            'multiplier': _known(found.multiplier), 'speed': _known(found.speed),
+            'damper_loss': _known(found.damper_loss),
+            'margins': {name: {
+                'low': margin.low, 'high': margin.high,
+                **{f'{side}_verdict': verdict and verdict.name.lower()
+                   for side, verdict in (('low', margin.low_verdict), ('high', margin.high_verdict))},
+            } for name, margin in found.margins.items()},
+            'sensitivity': [{'parameter': variation.parameter, 'factor': variation.factor,
+                             'verdict': variation.verdict.name.lower(), 'worst_steps': _known(variation.steps)}
+                            for variation in found.sensitivity],
+        } for name, found in chosen.items()},
+    }
+
+
+def _rig_line(task: Task) -> str:
+    rig = task.rig
+    same = rig.front == rig.rear
+    wheels = [f'{wheel.length:g} m, {wheel.mass:g} kg, {wheel.spokes:g} spokes' for wheel in (rig.front, rig.rear)]
+    return (f'Two wheels of {wheels[0]}' if same else f'A front wheel of {wheels[0]}, a rear one of {wheels[1]}'
+            ) + f', on {math.degrees(rig.slope):.3g}°.'
+
+
+def _coupler(task: Task, found: Assessment, parts: list[Part]) -> str:
+    names = ', '.join(filter(None, (_named(parts, 'spring', found.k), _named(parts, 'dashpot', found.b))))
+    scales = nondimensional(task.rig)[1]
+    return (f'k = {found.k:.4g} N/m, b = {found.b:.4g} N·s/m   (k̂ = {found.k / scales.stiffness:.3g}, '
+            f'b̂ = {found.b / scales.damping:.3g})' + (f'   {names}' if names else ''))
+
+
+def _named(parts: list[Part], kind: str, value: float) -> str:
+    return next((part.name for part in parts if part.kind == kind and part.value == value), '')
+
+
+def _percent_of(task: Task, theta2: float) -> float:
+    return 100.0 * theta2 / (2.0 * task.rig.rear.alpha)
+
+
+def _margin(margin: Margin) -> str:
+    low = f'{margin.low:.2f}' if margin.low_verdict is not None else f'<{1 / WIDEST:.2f}'
+    high = f'{margin.high:.2f}' if margin.high_verdict is not None else f'>{min(margin.high, WIDEST):.0f}'
+    return f'×{low} to ×{high}'
+
+
+def _outcome(variation: Variation) -> str:
+    return variation.verdict.name.lower() if math.isnan(variation.steps) else f'{variation.steps:.0f}'
+
+
+def _number(steps: float) -> str:
+    return '–' if math.isnan(steps) else f'{steps:.0f}'
+
+
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+class _Progress:
+    """Progress on a terminal: how many of the couplers of the present part are judged."""
+
+    def __enter__(self) -> '_Progress':
+        self._shown = sys.stderr.isatty()
+        return self
+
+    def among(self, total: int) -> Any:
+        """A report for a part of the work."""
+        done = 0
+
+        def report(more: int) -> None:
+            nonlocal done
+            done += more
+            if self._shown:
+                print(f'\rjudging couplers: {done} of {total}', end='', file=sys.stderr, flush=True)
+
+        return report
+
+    def __exit__(self, *_: object) -> None:
+        if self._shown:
+            print('\r\033[K', end='', file=sys.stderr, flush=True)

@@ -1,0 +1,235 @@
+"""`dcdrw models`: what the single wheel and the rigidly coupled pair do on a rig's slope."""
+
+import argparse
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from dcdrw.canvas import new_figure
+from dcdrw.suite.parameter_file import add_rig_options, chosen_params
+from dcdrw_msgs_py.quantity import flatten
+from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelParams
+from dcdrw_sim.figures import model_figures
+from dcdrw_sim.map.return_map import ReturnMap
+from dcdrw_sim.model.dynamics import gentlest_slope, limit_cycle_speed
+from dcdrw_sim.relatives import rigid_pair, rimless_wheel
+from dcdrw_sim.relatives.footfall_order import order, rear_lead, steady_contacts
+from dcdrw_sim.relatives.rigid_pair import NEAR_TOGETHER, RigidPair
+
+PHASES = (0.0, NEAR_TOGETHER, 0.25, 0.5, 0.75)
+GAITS = (0.0, 0.25, 0.5, 0.75)
+BANDS = 3
+
+_EPILOG = """\
+The single wheel is McGeer's rimless wheel. The rigid pair has a bar as long as D0 in the coupler's place (Smith and
+Berkemeier): its phase never changes. Phases are in percent of a step; "pull" is the greatest impulse at a strike that
+only a foot held to the ground can give, in percent of what the striking foot gets.
+The pictures: wheel.png (basin; speed against slope), pair.png (speed and energy per metre against phase),
+footfalls.png (gait diagrams). models.json holds the numbers, in SI units and radians.
+"""
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        'models', help='the single wheel and the rigidly coupled pair, to compare with', epilog=_EPILOG,
+        description='Tell what the models that the coupled pair builds on do on its slope.',
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    add_rig_options(parser)
+    parser.add_argument('--out', type=Path, metavar='DIR', help='draw the pictures and write models.json there, too')
+    parser.set_defaults(run=run, prog='dcdrw models')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command; returns the exit status."""
+    rig = chosen_params(options).rig.resolved()
+    if options.out:
+        new_figure(1, 1)
+        options.out.mkdir(parents=True, exist_ok=True)
+    found = record(rig)
+    print('\n'.join(report(found)))
+    if options.out:
+        text = json.dumps(found, indent=1, ensure_ascii=False)
+        (options.out / 'models.json').write_text(text + '\n', encoding='utf-8')
+        draw(rig, found, options.out)
+        print(f'numbers and pictures are in {options.out}')
+    return 0
+
+
+def record(rig: RigParams) -> dict[str, Any]:
+    """Everything for a program, in SI units and radians; None where there is no such thing.
+
+    Args:
+        rig: the rig, its derived defaults filled in.
+
+    """
+    return {
+        'parameters': flatten(rig),
+        'wheels': {name: _wheel(wheel, rig) for name, wheel in ((FRONT, rig.front), (REAR, rig.rear))},
+        'rigid_pair': _told(_rigid_pair, rig),
+        'coupled_pair': _told(_coupled_pair, rig),
+        'footfalls': [{'phase': phase, 'order': order(steady_contacts(phase)), 'rear_lead': rear_lead(phase)}
+                      for phase in GAITS],
+    }
+
+
+def _told(model: Any, rig: RigParams) -> dict[str, Any]:
+    """What a model comes to, or why it comes to nothing."""
+    try:
+        found: dict[str, Any] = model(rig)
+    except ValueError as error:
+        return {'trouble': str(error)}
+    return found
+
+
+def _wheel(wheel: WheelParams, rig: RigParams) -> dict[str, Any]:
+    slope, gravity = rig.slope, rig.gravity
+    after = float(limit_cycle_speed(wheel, slope, gravity))
+    rolls = not math.isnan(after)
+    return {
+        'omega_after_strike': _known(after),
+        'omega_before_strike': _known(float(limit_cycle_speed(wheel, slope, gravity, wheel.alpha))),
+        'period': _known(rimless_wheel.limit_cycle_period(wheel, slope, gravity)),
+        'velocity': _known(rimless_wheel.limit_cycle_velocity(wheel, slope, gravity)),
+        'energy_per_metre': wheel.mass * gravity * math.sin(slope) if rolls else None,
+        'multiplier': rimless_wheel.multiplier(wheel),
+        'gentlest_slope': gentlest_slope(wheel),
+        'slope_without_standing': wheel.alpha,
+        'slope_of_lift_off': rimless_wheel.steepest_slope(wheel),
+        'omega_to_pass': rimless_wheel.speed_to_pass(wheel, slope, gravity, -wheel.alpha),
+        'uphill_bands': rimless_wheel.uphill_bands(wheel, slope, gravity, BANDS),
+    }
+
+
+def _rigid_pair(rig: RigParams) -> dict[str, Any]:
+    velocity = RigidPair(rig, 0.5).gait().velocity
+    found: dict[str, Any] = {'bar': rig.D0, 'phases': [_rigid_gait(rig, phase, velocity) for phase in PHASES]}
+    if any(gait['velocity'] for gait in found['phases']):
+        phase = rigid_pair.fastest_phase(rig)
+        found['fastest'] = {'phase': phase, 'velocity': RigidPair(rig, phase).gait().velocity}
+    return found
+
+
+def _rigid_gait(rig: RigParams, phase: float, velocity: float) -> dict[str, Any]:
+    pair = RigidPair(rig, phase)
+    gait = pair.gait()
+    rolls = not math.isnan(gait.velocity)
+    slope = math.nan if math.isnan(velocity) else rigid_pair.slope_for_velocity(rig, phase, velocity)
+    feet = [impulse for impact in pair.impacts() for impulse in (impact.front_foot, impact.rear_foot)] if rolls else []
+    return {
+        'phase': phase, 'velocity': _known(gait.velocity), 'period': _known(gait.period),
+        'multiplier': pair.multiplier, 'gentlest_slope': _known(rigid_pair.gentlest_slope(rig, phase)),
+        'slope_at_velocity_of_50_percent': _known(slope),
+        'energy_per_metre_at_velocity_of_50_percent': _known(rigid_pair.energy_per_metre(rig._replace(slope=slope))),
+        'pull': max(0.0, -min(feet) / max(feet)) if feet else None,
+    }
+
+
+def _coupled_pair(rig: RigParams) -> dict[str, Any]:
+    return_map = ReturnMap(rig)
+    fixed = return_map.fixed_point()
+    return {'phase': float(return_map.phase(fixed.state)), 'period': fixed.period,
+            'velocity': rig.front.step_length / fixed.period, 'stable': fixed.stable}
+
+
+def report(found: dict[str, Any]) -> Iterator[str]:
+    """Lines for a person."""
+    wheels = found['wheels']
+    if wheels[FRONT] == wheels[REAR]:
+        yield from _wheel_lines('single wheel', wheels[FRONT], found['parameters']['slope'])
+    else:
+        for name, wheel in wheels.items():
+            yield from _wheel_lines(f'{name} wheel by itself', wheel, found['parameters']['slope'])
+    yield from _pair_lines(found['rigid_pair'])
+    coupled = found['coupled_pair']
+    yield 'coupled pair, to compare'
+    yield (f'  none: {coupled["trouble"]}' if 'trouble' in coupled else
+           f'  settles at {100 * coupled["phase"]:.1f} %, {coupled["velocity"]:.4f} m/s'
+           if coupled['stable'] else f'  its gait at {100 * coupled["phase"]:.1f} % is not stable')
+    yield 'footfalls, 1 front left, 2 front right, 3 rear left, 4 rear right'
+    for gait in found['footfalls']:
+        yield (f'  {100 * gait["phase"]:3.0f} %   {gait["order"]}   a rear foot leads the front one of its side by '
+               f'{100 * gait["rear_lead"]:.1f} % of a stride')
+
+
+def _wheel_lines(heading: str, wheel: dict[str, Any], slope: float) -> Iterator[str]:
+    yield heading
+    if wheel['velocity'] is None:
+        yield f'  limit cycle   none on {math.degrees(slope):.4g}°'
+    else:
+        yield (f'  limit cycle   {wheel["velocity"]:.4f} m/s, a step in {wheel["period"]:.4f} s; '
+               f'{wheel["omega_after_strike"]:.4f} rad/s after a strike, {wheel["omega_before_strike"]:.4f} before')
+        yield f'  loses         {wheel["energy_per_metre"]:.4g} J/m at strikes'
+    yield f'  multiplier    {wheel["multiplier"]:.4f}, cos² 2α: left of a deviation after a step'
+    yield (f'  slopes        above {math.degrees(wheel["gentlest_slope"]):.4g}° it rolls, from '
+           f'{math.degrees(wheel["slope_without_standing"]):.4g}° on it cannot stand; from '
+           f'{math.degrees(wheel["slope_of_lift_off"]):.4g}° on a real foot would lift off')
+    if slope < wheel['slope_without_standing']:
+        yield f'  passes apex   above {wheel["omega_to_pass"]:.4f} rad/s after a strike, else it comes to stand'
+        if wheel['uphill_bands']:
+            bands = ', '.join(f'{low:.3f} to {high:.3f}' for low, high in wheel['uphill_bands'])
+            yield f'  sent uphill   comes back to roll from {bands} rad/s, ...; between, to stand'
+
+
+def _pair_lines(pair: dict[str, Any]) -> Iterator[str]:
+    if 'trouble' in pair:
+        yield 'rigid pair'
+        yield f'  none: {pair["trouble"]}'
+        return
+    yield f'rigid pair, a bar of {pair["bar"]:.4g} m'
+    yield '                          deviation  rolls    at the speed of 50 %'
+    yield '  phase     speed   step   left      above    slope    loss      pull'
+    yield '  [%]       [m/s]   [s]    per step  [°]      [°]      [J/m]     [%]'
+    for gait in pair['phases']:
+        phase = {0.0: '0 at once', NEAR_TOGETHER: '0 in turn'}.get(gait['phase'], f'{100 * gait["phase"]:.0f}')
+        yield (f'  {phase:<10}{_number(gait["velocity"], 4):<8}{_number(gait["period"], 4):<7}'
+               f'{_number(gait["multiplier"], 4):<10}{_degrees(gait["gentlest_slope"]):<9}'
+               f'{_degrees(gait["slope_at_velocity_of_50_percent"]):<9}'
+               f'{_number(gait["energy_per_metre_at_velocity_of_50_percent"], 3):<10}'
+               f'{_number(None if gait["pull"] is None else 100 * gait["pull"], 1)}').rstrip()
+    if fastest := pair.get('fastest'):
+        yield f'  fastest at {100 * fastest["phase"]:.2f} %: {fastest["velocity"]:.4f} m/s'
+
+
+def draw(rig: RigParams, found: dict[str, Any], folder: Path) -> None:
+    """Draw the pictures.
+
+    Raises:
+        ValueError: matplotlib is not installed.
+
+    """
+    wheels = {FRONT: rig.front} if rig.front == rig.rear else {FRONT: rig.front, REAR: rig.rear}
+    figure = new_figure(11, 5 * len(wheels))
+    for (name, wheel), (basin, speed) in zip(wheels.items(), figure.subplots(len(wheels), 2, squeeze=False),
+                                             strict=True):
+        model_figures.draw_basin(basin, wheel, rig.slope, rig.gravity)
+        model_figures.draw_wheel_speed(speed, wheel, rig.slope, rig.gravity)
+        speed.set_title('a single wheel' if len(wheels) == 1 else f'the {name} wheel by itself')
+    figure.savefig(folder / 'wheel.png', dpi=120)
+    if 'fastest' in found['rigid_pair']:
+        figure = new_figure(11, 4.6)
+        speed, energy = figure.subplots(1, 2)
+        coupled = found['coupled_pair']
+        model_figures.draw_speed(speed, rig, (coupled['phase'], coupled['velocity']) if coupled.get('stable') else None)
+        model_figures.draw_energy(energy, rig)
+        figure.savefig(folder / 'pair.png', dpi=120)
+    figure = new_figure(11, 6)
+    for axes, phase in zip(figure.subplots(2, 2, sharex=True, sharey=True).flat, GAITS, strict=True):
+        model_figures.draw_hildebrand(axes, steady_contacts(phase, 2), title=f'p = {100 * phase:.0f} %')
+        axes.set_xlim(0.0, 2.0)
+        axes.label_outer()
+    figure.savefig(folder / 'footfalls.png', dpi=120)
+
+
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+def _number(value: float | None, digits: int) -> str:
+    return '-' if value is None else f'{value:.{digits}f}'
+
+
+def _degrees(value: float | None) -> str:
+    return _number(None if value is None else math.degrees(value), 3)

@@ -1,0 +1,99 @@
+"""`dcdrw replay`: a recording's joint states once more, for the same nodes."""
+
+import argparse
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+from dcdrw.arguments import number, positive
+from dcdrw.recordings.recording import Recording
+from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
+from dcdrw_msgs_py.topics import COUPLER, FRONT_WHEEL, JOINT_STATES, REAR_WHEEL
+
+_EPILOG = """\
+The samples keep the stamps that they had, and /clock goes with them: start the nodes with use_sim_time, so that they
+see the trial as it was. FACTOR is that of the stamps' time. The replay begins when somebody listens to joint_states.
+S counts from the recording's start, by its recorder's clock.
+Exit status: 0 all was sent, 2 wrong input, 130 interrupted.
+"""
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        'replay', help='publish recorded joint states again', epilog=_EPILOG,
+        description='Publish the joint states of a recording again, with their own stamps.',
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('recording', type=Path, metavar='RECORDING',
+                        help="a recording's folder, that of a trial, or an .mcap or .db3 file")
+    parser.add_argument('--rate', type=positive, default=1.0, metavar='FACTOR',
+                        help='how many times as fast as it was (default: %(default)g)')
+    parser.add_argument('--from', type=number, default=0.0, dest='begin', metavar='S', help='begin here (default: 0)')
+    parser.add_argument('--to', type=number, default=math.inf, dest='end', metavar='S',
+                        help='end here (default: at the end)')
+    parser.add_argument('--loop', action='store_true', help='begin again at the end; Ctrl-C ends it')
+    parser.add_argument('--rig', type=Path, metavar='FILE.yaml',
+                        help="parameter file with the recorded joints' names (front_joint, rear_joint, coupler_joint), "
+                        "which then get the suite's")
+    parser.add_argument('--topic', default=JOINT_STATES.name, metavar='NAME',
+                        help='where the joint states are, in any namespace (default: %(default)s)')
+    parser.add_argument('--namespace', default='', metavar='NS', help='of the topics to publish')
+    parser.set_defaults(run=replay, prog='dcdrw replay')
+
+
+def replay(options: argparse.Namespace) -> int:
+    """Run the command; returns the exit status."""
+    try:
+        import rclpy
+    except ImportError:
+        raise ValueError("a replay needs rclpy: source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' "
+                         'ros-jazzy-common-interfaces') from None
+    from dcdrw.nodes.replay_node import Part, ReplayNode
+    from dcdrw_msgs_py.node import run, steady_clock
+    names = _names(options.rig)
+    with Recording(options.recording) as recording:
+        topic = recording.find(options.topic)
+        part = Part(*_window(options, recording), options.rate, options.loop)
+        node: ReplayNode | None = None
+
+        def make() -> ReplayNode:
+            nonlocal node
+            node = ReplayNode(recording, topic, part, names)
+            node.create_timer(0.1, show, clock=steady_clock())
+            return node
+
+        def show() -> None:
+            if node and sys.stderr.isatty():
+                at = (node.log_ns - recording.start_ns) / 1e9
+                print(f'\r\x1b[K{at:6.1f} s  {node.sent} joint states' if node.sent else
+                      '\r\x1b[Kwaiting for a listener of joint_states ...', end='', file=sys.stderr, flush=True)
+            if node and node.done:
+                rclpy.shutdown()
+
+        namespace = ['-r', f'__ns:=/{options.namespace.strip("/")}'] if options.namespace else []
+        status = run('dcdrw replay', make, ['--ros-args', *namespace])
+        if node is None:
+            return status
+        if sys.stderr.isatty():
+            print(file=sys.stderr)
+        print(f'{node.sent} joint states sent')
+        return 0 if node.done else 130
+
+
+def _window(options: argparse.Namespace, recording: Recording) -> tuple[int, int]:
+    """Begin and end by the recorder's clock [ns]."""
+    length = (recording.end_ns - recording.start_ns) / 1e9
+    if not 0.0 <= options.begin < min(options.end, length):
+        raise ValueError(f'--from {options.begin:g} must lie before --to and within the recording ({length:.1f} s)')
+    end_ns = recording.end_ns if options.end >= length else recording.start_ns + round(options.end * 1e9)
+    return recording.start_ns + round(options.begin * 1e9), end_ns
+
+
+def _names(rig: Path | None) -> dict[str, str]:
+    """The names that are to change, and what to."""
+    if rig is None:
+        return {}
+    joints = read_parameter_file(rig, TrialParams()).phase
+    pairs = ((joints.front_joint, FRONT_WHEEL), (joints.rear_joint, REAR_WHEEL), (joints.coupler_joint, COUPLER))
+    return {recorded: name for recorded, name in pairs if recorded != name}

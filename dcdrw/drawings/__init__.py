@@ -1,0 +1,1 @@
+"""Drawings of the rig and of designs."""

@@ -1,0 +1,1 @@
+"""Nodes that record, replay, watch and draw a trial."""

@@ -1,0 +1,85 @@
+"""The listener of a trial: what the nodes publish, as far as a person wants to see it live. The recorder keeps it."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from rclpy.node import Node
+
+from dcdrw.trials.analysis import moves
+from dcdrw_msgs_py.diagnosis import Diagnosis, Level
+from dcdrw_msgs_py.messages import PhaseSampleReader, footfall
+from dcdrw_msgs_py.node import Age, listen
+from dcdrw_msgs_py.rig import FRONT, REAR
+from dcdrw_msgs_py.samples import PhaseSample
+from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, PHASE_STATE, SYNC_ERROR, SYNCHRONIZED
+from dcdrw_tracker.gait.sync import SyncMonitor, SyncParams
+
+
+class Observer(Node):
+    """Hears what a trial comes to."""
+
+    def __init__(self, params: SyncParams, **kwargs: Any) -> None:
+        super().__init__('trial', **kwargs)
+        self.monitor = SyncMonitor(params)
+        """Sees the wheels from the last sample before they move."""
+        self.heard: set[str] = set()
+        """Topics of which a message has come."""
+        self.strikes = {FRONT: 0, REAR: 0}
+        self.synchronized = False
+        """The monitor's verdict."""
+        self.moving = False
+        """The wheels have been let go."""
+        self.diagnoses: dict[str, Diagnosis] = {}
+        """What each node said of itself last."""
+        self.age = Age()
+        self._first: PhaseSample | None = None
+        self._last: PhaseSample | None = None
+        self._reader = PhaseSampleReader()
+        for topic, callback in ((PHASE_STATE, self._on_phase), (SYNC_ERROR, self._on_error),
+                                (SYNCHRONIZED, self._on_synchronized), (FOOTFALLS, self._on_footfall),
+                                (DIAGNOSTICS, self._on_diagnostics)):
+            listen(self, topic, self._bearing(topic.name, callback))
+
+    @property
+    def seconds(self) -> float:
+        """How long the wheels have been moving, by the stamps [s]."""
+        if not (self.moving and self._first and self._last):
+            return 0.0
+        return (self._last.stamp_ns - self._first.stamp_ns) * 1e-9
+
+    def _bearing(self, name: str, callback: Callable[[Any], None]) -> Callable[[Any], None]:
+        """A callback that passes over what it cannot read: on a shared domain others may publish, too."""
+        def bear(message: Any) -> None:
+            with suppress(ValueError):
+                callback(message)
+                self.heard.add(name)
+        return bear
+
+    def _on_phase(self, message: Any) -> None:
+        phase = self._reader.read(message)
+        self.age.renew()
+        if not self.moving:
+            self.moving = moves(phase)
+            if self.moving:
+                self._first = self._last or phase
+                self.monitor.update(self._first)
+        if self.moving:
+            self.monitor.update(phase)
+        self._last = phase
+
+    def _on_error(self, message: Any) -> None:
+        """That it comes is all."""
+
+    def _on_synchronized(self, message: Any) -> None:
+        self.synchronized = message.data
+
+    def _on_footfall(self, message: Any) -> None:
+        if self.moving:
+            self.strikes[footfall(message).wheel] += 1
+
+    def _on_diagnostics(self, message: Any) -> None:
+        for status in message.status:
+            self.diagnoses[status.name] = Diagnosis(
+                Level(min(status.level[0], Level.STALE)), status.message,
+                {pair.key: pair.value for pair in status.values})

@@ -1,0 +1,224 @@
+"""The node `recorder`: every topic of the suite, as it comes off the wire, into a recording."""
+
+import sys
+import time
+from array import array
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+from rcl_interfaces.srv import GetParameters
+from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_srvs.srv import SetBool
+
+from dcdrw.recordings.recorder import (
+    FLUSH_SECONDS,
+    PARAMETERS,
+    Recorder,
+    RecorderParams,
+    new_folder,
+    offered_qos,
+    write_whole,
+)
+from dcdrw.suite.executables import EXECUTABLES, RECORDED, RECORDER
+from dcdrw_msgs_py.diagnosis import Diagnosis, Level
+from dcdrw_msgs_py.node import Parameters, message_type, report, run, steady_clock
+from dcdrw_msgs_py.quantity import fields
+from dcdrw_msgs_py.topics import SAMPLE_DEPTH, Topic
+
+LOOK_SECONDS = 0.5
+"""How often the recorder looks who publishes, and who has not told its parameters yet."""
+ASK_AGAIN_SECONDS = 2.0
+
+
+class RecorderNode(Node):
+    """Subscribes raw, keeps the parameters of the suite's nodes, starts and stops a `Recorder`."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(RECORDER.name, **kwargs)
+        self._settings = Parameters(self, RecorderParams, self._configure)
+        self.recorder: Recorder | None = None
+        self.failure = ''
+        """Why the last recording ended before it was told to."""
+        self._ears: dict[str, _Ear] = {}
+        self._parameters: dict[str, dict[str, Any]] = {}
+        self._asked: dict[str, float] = {}
+        self._questions = {
+            node.name: (self.create_client(GetParameters, f'{node.name}/get_parameters'),
+                        [field.name for params in node.parameters for field in fields(params)])
+            for node in EXECUTABLES if node.name != RECORDER.name}
+        self._wanted = {self.resolve_topic_name(topic.name): topic for topic in RECORDED}
+        for word in self._settings.value.topics.split():
+            name, _, kind = word.partition(':')
+            self._wanted[self.resolve_topic_name(name)] = Topic(name, kind, '')
+        self.create_service(SetBool, '~/record', self._on_record)
+        report(self, self._diagnose)
+        self.create_timer(LOOK_SECONDS, self._look, clock=steady_clock())
+        self.create_timer(FLUSH_SECONDS, self._flush, clock=steady_clock())
+        if self._settings.value.record:
+            self.begin()
+
+    def begin(self) -> None:
+        """Begin a recording.
+
+        Raises:
+            ValueError: its folder exists, or a library is missing.
+            OSError: the folder cannot be made.
+
+        """
+        params = self._settings.value
+        self.recorder = Recorder(Path(params.folder) if params.folder else new_folder(), {'note': params.note})
+        self.failure = ''
+        self._parameters.clear()
+        self._asked.clear()
+        self._look()
+        self.get_logger().info(f'recording to {self.recorder.folder}')
+
+    def end(self) -> None:
+        """End the recording, if there is one, and write its index."""
+        for ear in self._ears.values():
+            self.destroy_subscription(ear.subscription)
+        self._ears.clear()
+        recorder, self.recorder = self.recorder, None
+        if recorder is None:
+            return
+        try:
+            recorder.close()
+        except OSError as error:
+            self.failure = _reason(error, recorder)
+        self.get_logger().info(f'{sum(recorder.counts.values())} messages in {recorder.folder}')
+
+    def destroy_node(self) -> None:
+        """End the recording, then the node."""
+        self.end()
+        super().destroy_node()
+
+    def _on_record(self, request: Any, response: Any) -> Any:
+        try:
+            if request.data and self.recorder is None:
+                self.begin()
+            elif not request.data:
+                folder = self.recorder.folder if self.recorder else None
+                self.end()
+                response.message = f'recorded: {folder}' if folder else 'not recording'
+            response.success = not self.failure
+            response.message = self.failure or response.message
+        except (ValueError, OSError) as error:
+            response.success, response.message = False, str(error)
+        if self.recorder:
+            response.message = str(self.recorder.folder)
+        return response
+
+    def _configure(self, params: RecorderParams) -> None:
+        if self.recorder:
+            self.recorder.about['note'] = params.note
+
+    def _look(self) -> None:
+        """Listen to each topic, reliably where all of its publishers are reliable; ask for parameters."""
+        if self.recorder is None:
+            return
+        types = dict(self.get_topic_names_and_types())
+        for name, topic in self._wanted.items():
+            kind = topic.type or next(iter(types.get(name, ())), '')
+            if kind:
+                self._listen(name, topic._replace(type=kind))
+        for node, (client, names) in self._questions.items():
+            late = time.monotonic() - self._asked.get(node, 0.0) > ASK_AGAIN_SECONDS
+            if node not in self._parameters and late and client.service_is_ready():
+                self._asked[node] = time.monotonic()
+                client.call_async(GetParameters.Request(names=names)).add_done_callback(
+                    partial(self._on_parameters, node, names))
+
+    def _listen(self, name: str, topic: Topic) -> None:
+        offers = [offer.qos_profile for offer in self.get_publishers_info_by_topic(name)]
+        reliable = all(offer.reliability == ReliabilityPolicy.RELIABLE for offer in offers)
+        latched = topic.latched if not offers else all(
+            offer.durability == DurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
+        ear = self._ears.get(name)
+        if ear and (ear.reliable, ear.latched) == (reliable, latched):
+            return
+        if self.recorder and name not in self.recorder.counts:
+            try:
+                self.recorder.add_topic(name, topic.type, [offered_qos(reliable, latched, topic.depth)])
+            except ValueError as error:
+                self.get_logger().warning(str(error))
+                del self._wanted[name]
+                return
+        if ear:
+            self.destroy_subscription(ear.subscription)
+        qos = QoSProfile(
+            depth=max(topic.depth, SAMPLE_DEPTH),
+            reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE)
+        self._ears[name] = _Ear(reliable, latched, self.create_subscription(
+            message_type(topic), name, lambda data: self._on_message(name, data), qos, raw=True))
+
+    def _on_message(self, name: str, data: bytes) -> None:
+        if self.recorder:
+            self.recorder.write(name, data)
+
+    def _on_parameters(self, node: str, names: list[str], answer: Any) -> None:
+        """Keep a node's parameters, as a file that the suite reads and beside the recording's other metadata."""
+        response = answer.result()
+        if self.recorder is None or response is None or len(response.values) != len(names):
+            return
+        values = zip(names, map(parameter_value_to_python, response.values), strict=True)
+        self._parameters[node] = {'ros__parameters': {
+            name: list(value) if isinstance(value, (array, tuple)) else value
+            for name, value in values if value == value}}  # NaN: derived from others
+        text = yaml.safe_dump(self._parameters, sort_keys=False, allow_unicode=True)
+        self.recorder.about['parameters'] = text
+        try:
+            write_whole(self.recorder.folder / PARAMETERS, text)
+        except OSError as error:
+            self._fail(error)
+
+    def _flush(self) -> None:
+        if self.recorder:
+            try:
+                self.recorder.flush()
+            except OSError as error:
+                self._fail(error)
+
+    def _fail(self, error: OSError) -> None:
+        """End a recording that cannot go on, and keep what it has."""
+        recorder, self.recorder = self.recorder, None
+        if recorder:
+            self.failure = _reason(error, recorder)
+            recorder.abort()
+            self.end()
+            self.get_logger().error(self.failure)
+
+    def _diagnose(self) -> Diagnosis:
+        recorder = self.recorder
+        if self.failure:
+            return Diagnosis(Level.ERROR, self.failure, {})
+        if recorder is None:
+            return Diagnosis(Level.OK, 'not recording', {})
+        return Diagnosis(Level.OK, f'recording to {recorder.folder}', {
+            'size': f'{recorder.size / 1e6:.1f} MB', 'parameters of': ', '.join(self._parameters),
+            **{f'messages of {topic}': str(count) for topic, count in recorder.counts.items()}})
+
+
+class _Ear(NamedTuple):
+    """A subscription, and how it was made."""
+
+    reliable: bool
+    latched: bool
+    subscription: Any
+
+
+def _reason(error: OSError, recorder: Recorder) -> str:
+    return f'the recording ended: {error.strerror}: {recorder.folder}; what came before is kept'
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node."""
+    return run(RECORDER.name, RecorderNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""The live page: its state, its server and its files."""

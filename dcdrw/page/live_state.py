@@ -1,0 +1,341 @@
+"""What the live page shows, as plain data: samples in, one small frame at a time out. No ROS, and no clock of its own.
+
+Everything kept here is bounded, so that hours at 1 kHz take no more memory than seconds.
+"""
+
+import json
+import math
+from collections import deque
+from typing import Any, NamedTuple
+
+from dcdrw.suite.executables import RECORDER, SIMULATOR, SYNC_MONITOR
+from dcdrw.suite.parameter_file import TrialParams
+from dcdrw_msgs_py.diagnosis import Level
+from dcdrw_msgs_py.quantity import Field, fields, lookup
+from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
+from dcdrw_msgs_py.samples import Footfall, JointSample, PhaseSample
+from dcdrw_tracker.gait.sync import SyncMonitor, SyncStatus
+
+FRAME_RATE = 25.0
+"""Frames per second [Hz]."""
+WINDOW_SECONDS = 20.0
+"""How far back the page's charts reach [s]."""
+POINT_NS = 20_000_000
+"""Charts get a point per so much time, however fast samples come."""
+FRAMES_KEPT = round(WINDOW_SECONDS * FRAME_RATE)
+"""Frames from which a browser that comes later draws the charts."""
+STALE_SECONDS = 1.0
+"""Without a sample for this long there is no data."""
+SILENT_SECONDS = 3.0
+"""A node that has said nothing on /diagnostics for this long is silent; each speaks once a second."""
+STEPS_SHOWN = 60
+NODES_SHOWN = 32
+_PENDING = 1000
+"""Points and footfalls that wait for the next frame at most: more than any source sends from one to the next."""
+_MATCHED = 1000
+"""Samples of both streams kept to find a pair of one stamp, as the streams may come with different lags."""
+
+SYNCHRONIZED, CONVERGING, STALLED, NO_DATA = 'SYNCHRONIZED', 'CONVERGING', 'STALLED', 'NO DATA'
+
+CONTROLS = {field.name: field for field in fields(RigParams) if field.name in ('k', 'b', 'slope')}
+"""What the page's sliders set."""
+
+
+class Command(NamedTuple):
+    """What somebody asks for on the page."""
+
+    do: str
+    """`set`, `reset`, `pause` or `record`."""
+    name: str = ''
+    """Of the parameter to set."""
+    value: float = 0.0
+    """To set it to, SI units; else true or false."""
+
+
+def read_command(text: str) -> Command:
+    """Read a command as the page sends it.
+
+    Raises:
+        ValueError: it is none, or its value is impossible: named with the bounds.
+
+    """
+    content = json.loads(text)
+    if not isinstance(content, dict):
+        raise ValueError('a command must be an object')
+    do, name, value = content.get('do'), content.get('name'), content.get('value')
+    if do == 'set' and isinstance(name, str) and name in CONTROLS:
+        return Command('set', name, CONTROLS[name].coerce(value))
+    if do == 'reset':
+        return Command('reset')
+    if do in ('pause', 'record') and isinstance(value, bool):
+        return Command(do, value=value)
+    raise ValueError(f'not a command: {text[:80]}')
+
+
+class _Health(NamedTuple):
+    level: int
+    message: str
+    at: float
+
+
+class LiveState:
+    """Takes what the topics bring; `frame` tells what is new.
+
+    Callers give the time `now` [s] by a clock that never jumps: ages are taken from it, all else from the stamps.
+    """
+
+    def __init__(self, params: TrialParams) -> None:
+        self._params = params
+        self._monitor = SyncMonitor(params.sync)
+        self._joints: deque[JointSample] = deque(maxlen=_MATCHED)
+        self._phases: deque[PhaseSample] = deque(maxlen=_MATCHED)
+        self._joints_at = self._phase_at = -math.inf
+        self._counted, self._counted_at, self._rate = 0, -math.inf, math.nan
+        self._verdict: bool | None = None
+        self._health: dict[str, _Health] = {}
+        self._feet: dict[str, float] = {}
+        self._run = 0
+        self._epoch_ns: int | None = None
+        self._phi_due_ns = self._force_due_ns = 0
+        self._force_range = math.inf, -math.inf
+        self._phis: deque[list[float]] = deque(maxlen=_PENDING)
+        self._forces: deque[list[float]] = deque(maxlen=_PENDING)
+        self._falls: deque[list[Any]] = deque(maxlen=_PENDING)
+        self._notices: deque[dict[str, Any]] = deque(maxlen=8)
+        self._board_at = -math.inf
+        self._told_steps = 0
+        self._controls: RigParams | None = None
+        self._paused = self._recording = False
+
+    @property
+    def complete(self) -> bool:
+        """Something has come from every node of a trial."""
+        return bool(self._phases) and SYNC_MONITOR.name in self._health
+
+    def configure(self, **changed: Any) -> None:
+        """Take changed parameters: `rig`, `phase` or `sync`, as in `TrialParams`."""
+        params = self._params._replace(**changed)
+        if params != self._params:
+            if params.sync != self._params.sync:
+                self._monitor.configure(params.sync)
+            self._params = params
+            self._renew()
+
+    def take_joints(self, joints: JointSample, now: float) -> None:
+        """Take a sample of `joint_states`."""
+        self._joints.append(joints)
+        self._joints_at = now
+        force = joints.coupler.force
+        if not math.isfinite(force):
+            return
+        low, high = self._force_range
+        low, high = min(low, force), max(high, force)
+        self._force_range = low, high
+        if not 0 < self._force_due_ns - joints.stamp_ns <= POINT_NS:
+            self._forces.append([self._seconds(joints.stamp_ns), round(low, 3), round(high, 3)])
+            self._force_range = math.inf, -math.inf
+            self._force_due_ns = joints.stamp_ns + POINT_NS
+
+    def take_phase(self, phase: PhaseSample, now: float) -> None:
+        """Take a sample of `phase_state`."""
+        if self._monitor.update(phase) is None:
+            return
+        last = self._phases[-1] if self._phases else None
+        if last is None or phase.restarts != last.restarts or phase.stamp_ns < last.stamp_ns:
+            self._restart()
+        self._phases.append(phase)
+        self._phase_at = now
+        self._counted += 1
+        if not 0 < self._phi_due_ns - phase.stamp_ns <= POINT_NS:
+            self._phis.append([self._seconds(phase.stamp_ns), round(math.degrees(phase.phi.angle), 3)])
+            self._phi_due_ns = phase.stamp_ns + POINT_NS
+
+    def take_footfall(self, fall: Footfall) -> None:
+        """Take a strike; one of a wheel that no rig has is passed over."""
+        if fall.wheel not in (FRONT, REAR):
+            return
+        self._feet[fall.wheel] = fall.x
+        self._falls.append([fall.wheel, self._seconds(fall.stamp_ns), fall.steps])
+
+    def take_verdict(self, synchronized: bool) -> None:
+        """Take what the monitor says on `synchronized`."""
+        self._verdict = synchronized
+
+    def take_health(self, name: str, level: int, message: str, now: float) -> None:
+        """Take what a node says of itself on `/diagnostics`."""
+        last = self._health.pop(name, None)
+        self._health[name] = _Health(level, message, now)  # the last that spoke is last
+        if len(self._health) > NODES_SHOWN:
+            del self._health[next(iter(self._health))]
+        if name == SIMULATOR.name and message in ('paused', 'running'):
+            self._paused = message == 'paused'
+        elif name == RECORDER.name:
+            self._recording = message.startswith('recording')
+        if last is None or last[:2] != (level, message):
+            self._renew()
+
+    def take_controls(self, rig: RigParams | None) -> None:
+        """Take the simulator's own parameters; None where it does not answer."""
+        if rig != self._controls:
+            self._controls = rig
+            self._renew()
+        if rig:
+            self.configure(rig=rig)
+
+    def take_switches(self, *, paused: bool | None = None, recording: bool | None = None) -> None:
+        """Take what a button has done, before its node says so on `/diagnostics`."""
+        self._paused = self._paused if paused is None else paused
+        self._recording = self._recording if recording is None else recording
+        self._renew()
+
+    def notice(self, text: str, ok: bool) -> None:
+        """Tell all who watch what came of a command."""
+        self._notices.append({'text': text, 'ok': ok})
+
+    def frame(self, now: float) -> dict[str, Any]:
+        """What is new since the last frame, ready for JSON: no NaN; angles in degrees where a name says so."""
+        status = self._monitor.status()
+        state, detail = self._judge(status, now)
+        frame: dict[str, Any] = {'state': state, 'detail': detail, 'run': self._run}
+        if self._phases:
+            frame['rig'] = self._rig()
+        for name, new in (('phis', self._phis), ('forces', self._forces), ('falls', self._falls),
+                          ('notices', self._notices)):
+            if new:
+                frame[name] = list(new)
+                new.clear()
+        if now - self._counted_at >= 1.0:
+            self._rate = self._counted / (now - self._counted_at)
+            self._counted, self._counted_at = 0, now
+        if now - self._board_at >= 1.0 or status.steps != self._told_steps:
+            frame['board'] = self._board(status, now)
+            self._board_at, self._told_steps = now, status.steps
+        return frame
+
+    def _restart(self) -> None:
+        """The source has started anew: what the charts had is of another run."""
+        self._run += 1
+        for kept in (self._phases, self._phis, self._falls, self._feet):
+            kept.clear()
+        self._renew()
+
+    def _renew(self) -> None:
+        """Let the next frame tell what seldom changes."""
+        self._board_at = -math.inf
+
+    def _seconds(self, stamp_ns: int) -> float:
+        """Time of the page's charts: since the first stamp that came."""
+        if self._epoch_ns is None:
+            self._epoch_ns = stamp_ns
+        return round((stamp_ns - self._epoch_ns) * 1e-9, 4)
+
+    def _speaks(self, name: str, now: float) -> bool:
+        return name in self._health and now - self._health[name].at <= SILENT_SECONDS
+
+    def _judge(self, status: SyncStatus, now: float) -> tuple[str, str]:
+        """The state, and a line that explains it."""
+        age = now - self._phase_at
+        if not age <= STALE_SECONDS:
+            return NO_DATA, self._why_no_data(age, now)
+        detail = 'paused: the wheels are held' if self._paused and self._speaks(SIMULATOR.name, now) else ''
+        if status.stalled:
+            return STALLED, detail or f'no more strikes of the {" and the ".join(status.stalled)} wheel'
+        # The monitor has watched for longer than this page; where none speaks, the same core judges here.
+        monitor = self._health[SYNC_MONITOR.name] if self._speaks(SYNC_MONITOR.name, now) else None
+        if self._verdict if monitor else status.synchronized:
+            message = monitor.message if monitor else ''
+            return SYNCHRONIZED, detail or (message if message.startswith('synchronized') else 'in step')
+        if status.slipped:
+            detail = detail or f'slipped a step: n = {status.step_difference}'
+        elif status.lost:
+            detail = detail or 'synchronization was lost'
+        band, hold = self._params.sync.band_percent, self._params.sync.hold_steps
+        return CONVERGING, detail or f'until the error stays within ±{band:g} % for {hold} steps'
+
+    def _why_no_data(self, age: float, now: float) -> str:
+        if now - self._joints_at <= STALE_SECONDS:
+            return 'joint_states come, but no phase_state: does phase_estimator run, and does it know the joints?'
+        if math.isfinite(age):
+            return f'nothing has come for {age:.0f} s'
+        return 'no joint_states yet: is the source running, on this ROS domain?'
+
+    def _rig(self) -> dict[str, Any]:
+        """Where the wheels are: from the last sample of the phase whose joints are known, too."""
+        known = {joints.stamp_ns: joints for joints in self._joints}
+        phase = next((phase for phase in reversed(self._phases) if phase.stamp_ns in known), self._phases[-1])
+        joints = known.get(phase.stamp_ns, JointSample(phase.stamp_ns, phase.front, phase.rear))
+        front, rear = self._params.phase.front, self._params.phase.rear
+        theta1, theta2 = phase.front.angle, phase.rear.angle
+        pitch = self._params.sync.front.alpha + self._params.sync.rear.alpha
+        share = 100.0 * phase.phi.angle / pitch
+        return {
+            'stamp_ns': str(phase.stamp_ns),  # JavaScript's numbers do not hold it
+            'theta': [_rounded(theta1, 5), _rounded(theta2, 5)],
+            # Which spoke stands: it shows that the wheels roll.
+            'legs': [_rounded((joints.front.angle - theta1) / (2.0 * front.alpha), 0),
+                     _rounded((joints.rear.angle - theta2) / (2.0 * rear.alpha), 0)],
+            'n': phase.step_difference,
+            'S': _rounded(self._stance_distance(phase, joints.coupler.length), 5),
+            'phi_deg': _rounded(math.degrees(phase.phi.angle), 3),
+            'phase_percent': _rounded(share, 2),
+            'error_percent': _rounded(math.remainder(share - 50.0, 100.0), 2),
+            'force': _rounded(joints.coupler.force, 2),
+        }
+
+    def _stance_distance(self, phase: PhaseSample, D: float) -> float:
+        """S from the coupler's length D where the source knows it; else from footfalls, or from n (contract §1)."""
+        front, rear = self._params.phase.front, self._params.phase.rear
+        if len(self._feet) == 2:
+            S = self._feet[FRONT] - self._feet[REAR]
+        else:  # a trial starts just after a strike of the front wheel
+            S0 = front.length if math.isnan(self._params.phase.S0) else self._params.phase.S0
+            S = S0 + (1 + phase.step_difference) * front.step_length
+        dx = front.length * math.sin(phase.front.angle) - rear.length * math.sin(phase.rear.angle)
+        dy = front.length * math.cos(phase.front.angle) - rear.length * math.cos(phase.rear.angle)
+        if not D >= abs(dy):
+            return S
+        return math.copysign(math.sqrt(D * D - dy * dy), S + dx) - dx
+
+    def _board(self, status: SyncStatus, now: float) -> dict[str, Any]:
+        """What seldom changes."""
+        params = self._params
+        shapes = params.phase.front, params.phase.rear
+        simulated = self._controls is not None and self._speaks(SIMULATOR.name, now)
+        return {
+            'wheels': [[shape.length, shape.spokes] for shape in shapes],
+            'slope': params.rig.slope,
+            'pitch_deg': math.degrees(params.sync.front.alpha + params.sync.rear.alpha),
+            'band_percent': params.sync.band_percent,
+            'rate': _rounded(self._rate, 0),
+            'steps': status.steps,
+            'errors': [_rounded(error, 2) for error in status.history[-STEPS_SHOWN:]],
+            'entered': status.steps_to_synchronization,
+            'ratio': _rounded(status.contraction, 3),
+            'nodes': [self._node(name, now) for name in sorted(self._health)],
+            'controls': [_control(field, params.rig) for field in CONTROLS.values()],
+            'simulated': simulated,
+            'paused': self._paused,
+            'recorder': self._speaks(RECORDER.name, now),
+            'recording': self._recording,
+        }
+
+    def _node(self, name: str, now: float) -> dict[str, Any]:
+        level, message, at = self._health[name]
+        if now - at > SILENT_SECONDS:
+            level, message = Level.STALE, f'silent for {now - at:.0f} s'
+        return {'name': name, 'level': Level(level).name, 'message': message}
+
+
+def _control(field: Field, rig: RigParams) -> dict[str, Any]:
+    """A slider: from 0 to four times the default; its field takes whatever the parameter may be."""
+    quantity = field.quantity
+    unit, scale = ('°', math.degrees(1.0)) if quantity.unit == 'rad' else (quantity.unit, 1.0)
+    return {
+        'name': field.name, 'doc': quantity.doc, 'unit': unit, 'scale': scale,
+        'low': _rounded(quantity.low, 6), 'high': _rounded(quantity.high, 6), 'top': 4.0 * field.default,
+        'value': lookup(rig, field.name),
+    }
+
+
+def _rounded(value: float, digits: int) -> float | None:
+    return round(value, digits) if math.isfinite(value) else None

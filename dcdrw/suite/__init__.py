@@ -1,0 +1,1 @@
+"""What the suite consists of: executables, parameters, processes."""

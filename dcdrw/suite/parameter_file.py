@@ -1,0 +1,145 @@
+"""Rig files: ROS 2 parameter files, so that one file serves the command line and every node."""
+
+import argparse
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import yaml
+
+from dcdrw.suite.executables import EXECUTABLES
+from dcdrw_msgs_py.quantity import build, fields, flatten
+from dcdrw_msgs_py.rig import RigParams, WheelPitch, WheelShape
+from dcdrw_sim.model.presets import PRESETS
+from dcdrw_sim.rig.simulator import SimulatorParams
+from dcdrw_tracker.gait.phase import PhaseParams
+from dcdrw_tracker.gait.sync import SyncParams
+
+_EVERY_NODE = '/**'
+_PARAMETERS = 'ros__parameters'
+_OF_ROS = ('use_sim_time',)
+_NODES_OF = {kind: [node.name for node in EXECUTABLES if kind in node.parameters]
+             for each in EXECUTABLES for kind in each.parameters}
+_NODES = tuple(dict.fromkeys(name for names in _NODES_OF.values() for name in names))
+Sets = TypeVar('Sets', bound=tuple[Any, ...])
+
+
+class TrialParams(NamedTuple):
+    """The parameters of all nodes of a trial."""
+
+    rig: RigParams = RigParams()
+    simulator: SimulatorParams = SimulatorParams()
+    phase: PhaseParams = PhaseParams()
+    sync: SyncParams = SyncParams()
+
+    @classmethod
+    def of_rig(cls, rig: RigParams) -> 'TrialParams':
+        """A rig, and trackers that know its wheels."""
+        front, rear = rig.front, rig.rear
+        return cls(
+            rig,
+            phase=PhaseParams(WheelShape(front.length, front.spokes), WheelShape(rear.length, rear.spokes)),
+            sync=SyncParams(WheelPitch(front.spokes), WheelPitch(rear.spokes)))
+
+
+def read_parameter_file(path: Path, base: Sets) -> Sets:
+    """Read a parameter file as the nodes will; what it does not name is as in `base`.
+
+    Args:
+        path: the file.
+        base: parameter sets by name, as `TrialParams`; each must be an executable's.
+
+    Raises:
+        ValueError: not YAML, not a parameter file, an unknown or impossible parameter: named with the file.
+        OSError: the file cannot be read.
+
+    """
+    try:
+        content = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ValueError(f'{path} is not YAML: {" ".join(str(error).split())}') from None
+    if not isinstance(content, dict) or not all(_is_section(section) for section in content.values()):
+        raise ValueError(f'{path} is not a parameter file: it must have the form of config/rig.yaml, '
+                         f'"{_EVERY_NODE}:", "{_PARAMETERS}:", then the parameters')
+    sections = {_EVERY_NODE, *_NODES, *(f'/{node}' for node in _NODES)}
+    for section in content:
+        if section not in sections:
+            raise ValueError(f'{path} has parameters for {section}, which no trial has; there are '
+                             f'{", ".join((_EVERY_NODE, *_NODES))}')
+    kinds = {name: type(values) for name, values in zip(base._fields, base, strict=True)}  # type: ignore[attr-defined]
+    known = {field.name for kind in _NODES_OF for field in fields(kind)}.union(_OF_ROS)
+    sets: dict[str, Any] = {}
+    for name, kind in kinds.items():
+        mine = {field.name for field in fields(kind)}
+        own = (name for node in _NODES_OF[kind] for name in (node, f'/{node}'))
+        values = {key: value for section in (_EVERY_NODE, *own)
+                  for key, value in _flatten(content.get(section, {}).get(_PARAMETERS) or {})}
+        chosen = {key: value for key, value in values.items() if key in mine or key not in known}
+        sets[name] = build(kind, flatten(getattr(base, name)) | chosen, str(path))
+    return type(base)(**sets)
+
+
+def add_rig_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that choose a rig."""
+    presets = '; '.join(f'{name}, {preset.doc}' for name, preset in PRESETS.items())
+    parser.add_argument('--preset', choices=PRESETS, default='paper', metavar='NAME',
+                        help=f'the rig: {presets} (default: %(default)s)')
+    parser.add_argument('--rig', type=Path, metavar='FILE.yaml',
+                        help='parameters that differ from the preset: a ROS 2 parameter file, as config/rig.yaml')
+
+
+def chosen_params(options: argparse.Namespace) -> TrialParams:
+    """The parameters that these options choose.
+
+    Raises:
+        ValueError, OSError: as `read_parameter_file`.
+
+    """
+    params = TrialParams.of_rig(PRESETS[options.preset].rig)
+    return read_parameter_file(options.rig, params) if options.rig else params
+
+
+def write_parameter_file(params: Iterable[tuple[Any, ...]], path: Path) -> None:
+    """Write every parameter, each under the nodes that read it; derived defaults are left to the nodes."""
+    content: dict[str, Any] = {}
+    for values in params:
+        for node in _NODES_OF[type(values)]:
+            content.setdefault(node, {_PARAMETERS: {}})[_PARAMETERS].update(given(values))
+    path.write_text(yaml.safe_dump(content, sort_keys=False, allow_unicode=True), encoding='utf-8')
+
+
+def write_changed(source: Path | None, changes: Mapping[str, Any], path: Path, remark: str) -> None:
+    """Write a copy of a parameter file in which some parameters have other values, for every node.
+
+    Args:
+        source: the file; None: one that holds nothing.
+        changes: values by dotted names.
+        path: of the copy.
+        remark: its first line.
+
+    """
+    sections = yaml.safe_load(source.read_text(encoding='utf-8')) if source else {}
+    content = {section: {name: value for name, value in _flatten(tree[_PARAMETERS] or {}) if name not in changes}
+               for section, tree in sections.items()}
+    content[_EVERY_NODE] = {**content.get(_EVERY_NODE, {}), **changes}
+    text = yaml.safe_dump({section: {_PARAMETERS: values} for section, values in content.items()}, sort_keys=False,
+                          allow_unicode=True)
+    path.write_text(f'# {remark}\n{text}', encoding='utf-8')
+
+
+def given(values: tuple[Any, ...]) -> dict[str, Any]:
+    """What a parameter file says of a set: no derived defaults, and lists of their own, for ROS reads no aliases."""
+    return {key: list(value) if isinstance(value, tuple) else value
+            for key, value in flatten(values).items() if value == value}
+
+
+def _is_section(section: Any) -> bool:
+    return isinstance(section, dict) and isinstance(section.get(_PARAMETERS) or {}, dict) and _PARAMETERS in section
+
+
+def _flatten(tree: Mapping[str, Any], prefix: str = '') -> Iterator[tuple[str, Any]]:
+    for name, value in tree.items():
+        if isinstance(value, dict):
+            yield from _flatten(value, f'{prefix}{name}.')
+        else:
+            yield f'{prefix}{name}', value

@@ -1,0 +1,1 @@
+"""Trials: running, filming, analysing and reporting them."""

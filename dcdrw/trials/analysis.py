@@ -1,0 +1,222 @@
+"""What follows from joint states: the same estimator and monitor as the nodes', as fast as they go. Knows no ROS."""
+
+import gc
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from itertools import chain
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dcdrw.recordings.joint_batch import JointBatch
+from dcdrw.suite.parameter_file import TrialParams
+from dcdrw_msgs_py.samples import SECOND, CouplerSample, Footfall, JointSample, PhaseSample, Turn, run_of
+from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseStatus
+from dcdrw_tracker.gait.sync import SyncMonitor, SyncStatus
+
+HELD = 0.1
+"""A wheel that turns slower may be held, seen through the noise of a camera [rad/s]."""
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class Motion(NamedTuple):
+    """Columns of one length: a row for each joint state that the estimator took, and what it made of it."""
+
+    stamp_ns: Integers
+    rotation1: Floats
+    """ψ1 as it was measured [rad]."""
+    rotation2: Floats
+    coupler_length: Floats
+    """D [m]; NaN, as Ḋ and F, where the source does not tell it."""
+    coupler_rate: Floats
+    """Ḋ [m/s]."""
+    coupler_force: Floats
+    """F [N]."""
+    theta1: Floats
+    """[rad]"""
+    omega1: Floats
+    """[rad/s]"""
+    theta2: Floats
+    omega2: Floats
+    phi: Floats
+    """[rad]"""
+    phi_rate: Floats
+    """[rad/s]"""
+    step_difference: Integers
+    restarts: Integers
+    """How often the source had started anew."""
+    error_percent: Floats
+    """100 (p − 0.5) [% of a step]; NaN where the monitor refused the sample."""
+    synchronized: NDArray[np.bool_]
+    """The monitor's verdict."""
+
+    def rows(self, part: Any) -> 'Motion':
+        """These rows of every column."""
+        return Motion(*(column[part] for column in self))
+
+    @property
+    def seconds(self) -> Floats:
+        """Time since the first row [s]."""
+        return np.asarray((self.stamp_ns - self.stamp_ns[:1]) / SECOND)
+
+
+class Analysis(NamedTuple):
+    """A trial, from its joint states alone."""
+
+    params: TrialParams
+    motion: Motion
+    """From the last sample before the wheels move."""
+    held: Motion
+    """Before that."""
+    footfalls: tuple[Footfall, ...]
+    status: SyncStatus
+    """Of a monitor that saw `motion`."""
+    estimator: PhaseStatus
+    joint_states: int
+    """Messages, from the first of `motion` on; those that were refused included."""
+    unreadable: str
+    """Why the last one that could not be read could not be; empty where all could."""
+
+    @property
+    def pitch(self) -> float:
+        """The angle φ of a whole step, α1 + α2 [rad]."""
+        return self.params.sync.front.alpha + self.params.sync.rear.alpha
+
+
+def analyze(batches: Iterable[JointBatch], params: TrialParams) -> Analysis:
+    """Run estimator and monitor over the joint states of a trial.
+
+    The monitor starts afresh when the wheels are let go: with the last sample before a wheel moves.
+    """
+    trial = _Trial(params)
+    with _no_collections():
+        for batch in batches:
+            trial.take(batch)
+    return trial.result()
+
+
+def moves(phase: PhaseSample) -> bool:
+    """Whether a wheel moves; one of unknown speed does."""
+    return not (abs(phase.front.rate) <= HELD and abs(phase.rear.rate) <= HELD)
+
+
+@contextmanager
+def _no_collections() -> Iterator[None]:
+    """Nothing here refers to itself, so looking for such garbage only costs: a tenth of the time."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+class _Trial:
+    def __init__(self, params: TrialParams) -> None:
+        self._params = params
+        self._estimator = PhaseEstimator(params.phase)
+        self._monitor = SyncMonitor(params.sync)
+        self._moving = False
+        self._held = self._received = 0
+        self._rows = 0
+        self._footfalls: list[Footfall] = []
+        self._parts: list[list[Any]] = []
+        self._last: PhaseSample | None = None
+        self._unreadable = ''
+
+    def take(self, batch: JointBatch) -> None:
+        """Feed one batch through both cores."""
+        joints = self._params.phase
+        error = batch.error or _missing(batch.names, (joints.front_joint, joints.rear_joint))
+        if error:
+            for _ in range(batch.messages):
+                self._estimator.refuse('unreadable')
+            self._received += batch.messages
+            self._unreadable = error
+            return
+        front, rear = batch.names.index(joints.front_joint), batch.names.index(joints.rear_joint)
+        columns = (batch.stamp_ns, *(table[:, wheel] for wheel in (front, rear)
+                                     for table in (batch.position, batch.velocity)))
+        rows, phases, errors, verdicts = self._follow([column.tolist() for column in columns], run_of(batch.frame))
+        if not rows:
+            return
+        taken = np.array(rows)
+        _, front_turns, rear_turns, phis, differences, restarts = zip(*phases, strict=True)
+        if joints.coupler_joint in batch.names:
+            coupler = batch.names.index(joints.coupler_joint)
+            known = [table[taken, coupler] for table in (batch.position, batch.velocity, batch.effort)]
+        else:
+            known = [np.full(len(taken), math.nan)] * 3
+        self._parts.append([
+            batch.stamp_ns[taken], batch.position[taken, front], batch.position[taken, rear], *known,
+            *(column for turns in (front_turns, rear_turns, phis) for column in _columns(turns)),
+            np.array(differences, np.int64), np.array(restarts, np.int64), np.array(errors, float),
+            np.array(verdicts, bool)])
+        self._rows += len(taken)
+
+    def _follow(self, columns: list[list[Any]],
+                run: int) -> tuple[list[int], list[PhaseSample], list[float], list[bool]]:
+        """Rows that were accepted, and what came of them: phase, error and verdict."""
+        taken: list[int] = []
+        phases: list[PhaseSample] = []
+        errors: list[float] = []
+        verdicts: list[bool] = []
+        update, coupler = self._estimator.update, CouplerSample()
+        for row, (stamp_ns, psi1, omega1, psi2, omega2) in enumerate(zip(*columns, strict=True)):
+            made = update(JointSample(stamp_ns, Turn(psi1, omega1), Turn(psi2, omega2), coupler, run))
+            if made is None:
+                continue
+            phase, footfalls = made
+            if not self._moving and moves(phase):
+                self._let_go(row, len(taken))
+            sync = self._monitor.update(phase)
+            self._last = phase
+            if footfalls:
+                self._footfalls.extend(footfalls)
+            taken.append(row)
+            phases.append(phase)
+            errors.append(sync.error_percent if sync else math.nan)
+            verdicts.append(bool(sync and sync.synchronized))
+        self._received += len(columns[0])
+        return taken, phases, errors, verdicts
+
+    def _let_go(self, row: int, taken: int) -> None:
+        self._moving = True
+        self._monitor = SyncMonitor(self._params.sync)
+        self._received = -row
+        self._footfalls.clear()
+        if self._last:
+            self._monitor.update(self._last)
+            self._received += 1
+            self._held = self._rows + taken - 1
+
+    def result(self) -> Analysis:
+        """All that there is."""
+        motion = Motion(*(np.concatenate(column) for column in zip(*self._parts, strict=True))) if self._parts else (
+            Motion(*(np.empty(0, kind) for kind in _KINDS)))
+        return Analysis(
+            self._params, motion.rows(slice(self._held, None)), motion.rows(slice(self._held)),
+            tuple(self._footfalls), self._monitor.status(), self._estimator.status(), self._received,
+            self._unreadable)
+
+
+def _columns(turns: Sequence[Turn]) -> Floats:
+    """Angles and rates: np.array would take six times as long over tuples."""
+    columns: Floats = np.fromiter(chain.from_iterable(turns), np.float64, 2 * len(turns)).reshape(-1, 2).T
+    return columns
+
+
+_KINDS = (np.int64, *[np.float64] * 11, np.int64, np.int64, np.float64, np.bool_)
+
+
+def _missing(names: Sequence[str], wheels: Sequence[str]) -> str:
+    for name in wheels:
+        if names.count(name) != 1:
+            what = 'stands twice in the message' if name in names else (
+                f'is missing; the message names {", ".join(names) or "none"}')
+            return f'joint {name} {what}'
+    return ''

@@ -1,0 +1,1 @@
+"""The virtual camera: scene, rendering, shutter and node."""

@@ -1,0 +1,1 @@
+"""The return map: fixed points, multipliers, regressions."""

@@ -1,0 +1,112 @@
+"""How small deviations grow along a motion: the variational equation between strikes, and its jumps at them.
+
+A deviation x of the state [θ1, ω1, θ2, ω2] follows x' = J x, J the Jacobian of the paper's (1) and (2) along the
+motion. At a strike it jumps by the saltation matrix, because a deviation also moves the strike's time (Leine and
+Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004).
+"""
+
+from collections.abc import Sequence
+from functools import reduce
+from itertools import pairwise
+from operator import matmul
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+from dcdrw_msgs_py.rig import RigParams
+from dcdrw_sim.model.dynamics import State, accelerations, coupler, coupler_force, stance_distance
+from dcdrw_sim.motion.pair import Segment
+from dcdrw_sim.motion.strikes import reset
+
+Floats = NDArray[np.float64]
+
+STAGES = 12
+"""Points per segment of the Gauss-Legendre method: of order 24, so that rounding is what remains."""
+
+_NODES, _WEIGHTS = legendre.leggauss(STAGES)
+_PARTS = 0.5 * (_NODES + 1.0)
+_LAGRANGE = np.linalg.inv(legendre.legvander(_NODES, STAGES - 1))
+_INTEGRALS = 0.5 * legendre.legval(_NODES, legendre.legint(_LAGRANGE, lbnd=-1)).T
+"""[i, j]: what a value at point j of the unit interval adds to the integral up to point i."""
+
+
+def rates(rig: RigParams, state: State, S: float) -> Floats:
+    """Rates of [θ1, ω1, θ2, ω2], shape (4,)."""
+    acceleration1, acceleration2 = accelerations(rig, state, S)
+    return np.array([state.omega1, acceleration1, state.omega2, acceleration2])
+
+
+def jacobian(rig: RigParams, state: State, S: Any) -> Floats:
+    """Derivatives of the rates by the state, shape (..., 4, 4), at states and stance distances of shape (...)."""
+    (l1, m1, _), (l2, m2, _) = rig.front, rig.rear
+    theta1, omega1, theta2, omega2 = np.broadcast_arrays(*state)
+    length, rate, p1, p2 = coupler(rig, State(theta1, omega1, theta2, omega2), S)
+    cos_difference, zero, one = np.cos(theta1 - theta2), np.zeros(theta1.shape), np.ones(theta1.shape)
+    pull = coupler_force(rig, length, rate) / length
+
+    # Gradients by [θ1, ω1, θ2, ω2]: of p1, p2, D, of D Ḋ = ℓ1 p1 ω1 − ℓ2 p2 ω2, and of F/D.
+    by_p1 = np.array([l2 * cos_difference - S * np.sin(theta1), zero, -l2 * cos_difference, zero])
+    by_p2 = np.array([l1 * cos_difference, zero, -l1 * cos_difference - S * np.sin(theta2), zero])
+    by_length = np.array([l1 * p1, zero, -l2 * p2, zero]) / length
+    by_product = l1 * omega1 * by_p1 - l2 * omega2 * by_p2 + np.array([zero, l1 * p1, zero, -l2 * p2])
+    by_rate = (by_product - rate * by_length) / length
+    by_pull = (coupler_force(rig._replace(D0=0.0), by_length, by_rate) - pull * by_length) / length
+
+    weight1 = rig.gravity / l1 * np.cos(theta1 + rig.slope)
+    weight2 = rig.gravity / l2 * np.cos(theta2 + rig.slope)
+    rows = np.array([
+        [zero, one, zero, zero],
+        np.array([weight1, zero, zero, zero]) - (pull * by_p1 + p1 * by_pull) / (m1 * l1),
+        [zero, zero, zero, one],
+        np.array([zero, zero, weight2, zero]) + (pull * by_p2 + p2 * by_pull) / (m2 * l2),
+    ])
+    return np.moveaxis(rows, (0, 1), (-2, -1))
+
+
+def propagators(rig: RigParams, segments: Sequence[Segment]) -> Floats:
+    """What each of N segments does to a deviation, shape (N, 4, 4).
+
+    By collocation at Gauss points c_i, where all is known of the motion: X_i = 1 + h Σ_j a_ij J_j X_j, solved for
+    all points of a segment at once.
+    """
+    durations = np.array([segment.end - segment.start for segment in segments])
+    states = np.array([segment.at(segment.start + duration * _PARTS)
+                       for segment, duration in zip(segments, durations, strict=True)])
+    S = np.array([[stance_distance(rig, *segment.steps)] for segment in segments])
+    growth = durations[:, None, None, None] * jacobian(rig, State(*np.moveaxis(states, 1, 0)), S)
+    size = 4 * STAGES
+    system = np.eye(size) - np.einsum('ij,njab->niajb', _INTEGRALS, growth).reshape(-1, size, size)
+    start = np.tile(np.eye(4), (1, STAGES, 1))  # with all three axes: numpy 1 takes two for a row of vectors
+    deviations = np.linalg.solve(system, start).reshape(growth.shape)
+    total: Floats = np.eye(4) + np.einsum('j,njab,njbc->nac', 0.5 * _WEIGHTS, growth, deviations)
+    return total
+
+
+def jump(rig: RigParams, before: Segment, after: Segment) -> Floats:
+    """What the strike between two segments does to a deviation, shape (4, 4): the saltation matrix.
+
+    R + (f₊ − R f₋) nᵀ / (nᵀ f₋): R the derivative of the strike rule, f the rates, nᵀ x the striking angle. The
+    identity where no wheel strikes.
+    """
+    matrix = np.eye(4)
+    f_before, f_after = (rates(rig, segment.at(time), stance_distance(rig, *segment.steps))
+                         for segment, time in ((before, before.end), (after, after.start)))
+    for i, wheel in enumerate((rig.front, rig.rear)):
+        direction = after.steps[i] - before.steps[i]
+        if direction:
+            _, matrix[2 * i + 1, 2 * i + 1] = reset(wheel.alpha, 1.0, direction)
+            matrix[:, 2 * i] += (f_after - matrix @ f_before) / f_before[2 * i]
+    return matrix
+
+
+def motion_derivative(rig: RigParams, segments: Sequence[Segment]) -> Floats:
+    """Derivative of the state at the end of the last segment by that at the start of the first, shape (4, 4).
+
+    Both at fixed times; the rig's derived defaults are filled in. A strike at the end of the last segment is not in
+    it yet.
+    """
+    jumps = [jump(rig, *pair) for pair in pairwise(segments)]
+    factors = [matrix for pair in zip(propagators(rig, segments), [*jumps, np.eye(4)], strict=True) for matrix in pair]
+    return reduce(matmul, reversed(factors))

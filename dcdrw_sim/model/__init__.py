@@ -1,0 +1,1 @@
+"""The rig as equations: dynamics, strikes, scales, presets and starts."""

@@ -1,0 +1,1 @@
+"""Motions in time: Taylor series, strikes, one pair or many at once."""

@@ -1,0 +1,101 @@
+"""Cases and their strikes as JSON: what `dcdrw simulate` reads and writes."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from dcdrw_msgs_py.rig import RigParams, WheelParams
+from dcdrw_sim.model.dynamics import State
+from dcdrw_sim.motion.pair import Simulation
+from dcdrw_sim.motion.strikes import Strike
+from dcdrw_sim.motion.trajectory import Run
+
+DEFAULT_STRIKES = 20
+"""Strikes of a case that lists none."""
+
+_NUMBERS = ('g', 'slope', 'k', 'b', 'D0', 'S0')
+_PAIRS = ('l', 'm', 'alpha')
+
+
+class Case(NamedTuple):
+    """A rig and its start, as a case file holds them."""
+
+    name: str
+    rig: RigParams
+    state: State
+    listed_strikes: int
+    """How many strikes the file lists; DEFAULT_STRIKES where it lists none."""
+    raw: dict[str, Any]
+    """The `case` object as it was read."""
+
+
+def read_cases(path: Path) -> tuple[list[Case], bool]:
+    """Read one case or a list of cases; the second value tells whether it was a list.
+
+    A case is an object with g, slope, k, b, D0, S0, the pairs l, m, alpha, and x0 = [θ1, ω1, θ2, ω2]; or
+    such an object under the key `case` beside its `strikes`.
+
+    Raises:
+        ValueError: not JSON, not a case, or an impossible one: the message names the file, the case and the key.
+        OSError: the file cannot be read.
+
+    """
+    try:
+        content = json.loads(path.read_text(encoding='utf-8'))
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f'{path} is not JSON: {error}') from None
+    entries = content if isinstance(content, list) else [content]
+    if not entries:
+        raise ValueError(f'{path} holds no case: the list is empty')
+    return [_parse(entry, f'{path}, case {index}') for index, entry in enumerate(entries)], isinstance(content, list)
+
+
+def _parse(entry: Any, where: str) -> Case:
+    raw = entry.get('case', entry) if isinstance(entry, dict) else None
+    if not isinstance(raw, dict):
+        raise ValueError(f'{where}: must be an object with the keys {", ".join((*_NUMBERS, *_PAIRS, "x0"))}')
+    name = str(raw.get('name', 'case'))
+    where = f'{where} ({name})' if 'name' in raw else where
+    g, slope, k, b, D0, S0 = (_numbers(raw, key, where)[0] for key in _NUMBERS)
+    length, mass, alpha = (_numbers(raw, key, where, 2) for key in _PAIRS)
+    for angle in alpha:
+        if not 0.0 < angle <= math.pi / 4:
+            raise ValueError(f'{where}: alpha must be in (0, π/4] rad, got {angle}')
+    front, rear = (WheelParams(*values) for values in zip(length, mass, (math.pi / a for a in alpha), strict=True))
+    rig = RigParams(front, rear, k, b, D0, S0, slope, g)
+    state = State(*_numbers(raw, 'x0', where, 4))
+    try:
+        Simulation(rig, state)
+    except ValueError as error:
+        raise ValueError(f'{where}: {error}') from None
+    strikes = entry.get('strikes')
+    return Case(name, rig, state, len(strikes) if isinstance(strikes, list) and strikes else DEFAULT_STRIKES, raw)
+
+
+def _numbers(raw: dict[str, Any], key: str, where: str, count: int = 1) -> list[float]:
+    if key not in raw:
+        raise ValueError(f'{where}: {key} is missing')
+    values = raw[key] if count > 1 else [raw[key]]
+    if not isinstance(values, list) or len(values) != count or not all(map(_is_number, values)):
+        wanted = f'{count} finite numbers' if count > 1 else 'a finite number'
+        raise ValueError(f'{where}: {key} must be {wanted}, got {raw[key]!r}')
+    return [float(value) for value in values]
+
+
+def _is_number(value: Any) -> bool:
+    try:
+        return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:  # a whole number beyond every float
+        return False
+
+
+def strike_record(strike: Strike) -> dict[str, Any]:
+    """One strike as the file holds it."""
+    return {'wheel': strike.wheel, 't': strike.t, 'state': [float(value) for value in strike.state]}
+
+
+def run_record(case: Case, run: Run) -> dict[str, Any]:
+    """One case with its strikes and why it ended, in the format of the file that it came from."""
+    end = {'reason': run.end.name.lower(), 'meaning': run.reason, 't': run.duration}
+    return {'case': case.raw, 'strikes': [strike_record(strike) for strike in run.strikes], 'end': end}

@@ -1,0 +1,397 @@
+"""Many pairs at once: trajectories side by side in the lanes of the Taylor kernel, compiled where numba is."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dcdrw_msgs_py.quantity import fields, lookup
+from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelParams
+from dcdrw_sim.motion import strikes, taylor
+from dcdrw_sim.motion.compiled import compiled
+from dcdrw_sim.motion.pair import (
+    LEAVING_SPEED,
+    LONGEST_STEP,
+    SHORTEST_STEP,
+    STIFFEST,
+    MotionError,
+    accept,
+    work_parameters,
+)
+from dcdrw_sim.motion.strikes import BACKWARD, FORWARD, NONE, End, first_strike, reset
+from dcdrw_sim.motion.taylor import (
+    LANES,
+    OMEGA1,
+    OMEGA2,
+    THETA1,
+    THETA2,
+    bare,
+    expand,
+    minimum,
+    motion,
+    rows,
+    step_size,
+)
+
+Floats = NDArray[np.float64]
+Rigs = Any
+"""The rigs of N pairs in one: a `RigParams` in which every parameter is an array of shape (N,)."""
+
+TOLERANCE = 5e-16
+"""Last term of the angles' series at the end of a step [rad]: strikes within 1e-9 over 100 time units."""
+
+STRIKE = np.dtype([('wheel', np.int8), ('direction', np.int8), ('t', float), ('state', float, (4,))])
+"""One strike: wheel 1 or 2, direction, time [s], and the state just before it."""
+
+_FIELDS = tuple(fields(RigParams))
+STATE = (THETA1, OMEGA1, THETA2, OMEGA2)
+# Plain numbers, which compile.
+TOO_FAST, NONE_YET, NO_PAIR = -2, -1, -1
+TIME_OVER, STRIKES, STANDING, FALLEN, STALLED, HUBS_MET = (int(end) for end in End)
+
+# Rows of the work array behind those of the series.
+(PAIR, AHEAD1, AHEAD2, SLOWEST1, SLOWEST2, STRIKE1, STRIKE2, MISS1, MISS2, REACH, STEP, WHEEL, DIRECTION, S0, STRIDE1,
+ STRIDE2, SPEED1, SPEED2, UNIT, TIME, STEPS1, STEPS2, LAST1, LAST2, ROLLED1, ROLLED2, SIZE) = range(
+     taylor.END, taylor.END + 27 * LANES, LANES)
+NEWTON_ITERATIONS = 2
+"""From the error of the inverse cubic down to rounding, mostly."""
+CONVERGED = 1e-7
+"""Last correction of Newton's method that leaves rounding error after it."""
+
+
+class Ensemble(NamedTuple):
+    """What became of each of N pairs."""
+
+    strikes: NDArray[Any]
+    """dtype STRIKE, shape (N, capacity); each row is filled up to its count."""
+    counts: NDArray[np.int64]
+    """Strikes of each pair, shape (N,)."""
+    ends: NDArray[np.int64]
+    """`End` of each pair, or TOO_FAST, shape (N,)."""
+    durations: Floats
+    """Time at each pair's end [s], shape (N,)."""
+
+
+def run_ensemble(rig: RigParams, states: ArrayLike, seconds: float, capacity: int, tolerance: float = TOLERANCE,
+                 strict: bool = True, **columns: ArrayLike) -> Ensemble:
+    """Run many pairs of one rig, each with its own start and, where given, its own parameters.
+
+    Args:
+        rig: what all pairs share.
+        states: [θ1, ω1, θ2, ω2] of each pair, shape (N, 4).
+        seconds: when to end.
+        capacity: strikes to record of each pair; a pair with so many ends.
+        tolerance: last term of the angles' series at the end of a step [rad].
+        strict: a motion too fast to follow is an error; else its pair ends TOO_FAST.
+        columns: parameters by their (dotted) names, as `spread`.
+
+    Raises:
+        ValueError: an impossible parameter, state, limit or shape.
+        MotionError: a motion is too fast to follow.
+
+    """
+    return run_pairs(spread(rig, len(np.atleast_1d(states)), columns), states, seconds, capacity, tolerance, strict)
+
+
+def run_pairs(rigs: Rigs, states: ArrayLike, seconds: float, capacity: int, tolerance: float = TOLERANCE,
+              strict: bool = True) -> Ensemble:
+    """Run many pairs, each of its own rig.
+
+    Args:
+        rigs: as `spread` and `take` give them.
+        states: as the other arguments, those of `run_ensemble`.
+        seconds: when to end.
+        capacity: strikes to record of each pair.
+        tolerance: of the angles' series [rad].
+        strict: whether a motion too fast to follow is an error.
+
+    Raises:
+        ValueError: an impossible state, limit or shape.
+        MotionError: a motion is too fast to follow.
+
+    """
+    starts, count = np.ascontiguousarray(states, float), len(rigs.k)
+    if starts.shape != (count, 4):
+        raise ValueError(f'states must be of shape (N, 4), got {starts.shape}')
+    if not (seconds >= 0.0 and capacity >= 1 and tolerance > 0.0):
+        raise ValueError('seconds must be ≥ 0, capacity ≥ 1 and tolerance > 0, '
+                         f'got {seconds}, {capacity} and {tolerance}')
+    free = np.full(count, math.inf)
+    limits = np.column_stack([rigs.front.alpha, free, rigs.rear.alpha, free]) * (1 + 1e-12)
+    if not (np.isfinite(starts) & (np.abs(starts) <= limits)).all():
+        raise ValueError('states must be finite, their angles within ±α of their wheels')
+    ensemble = Ensemble(np.zeros((count, capacity), STRIKE), np.zeros(count, np.int64), np.zeros(count, np.int64),
+                        np.zeros(count))
+    if count:
+        with np.errstate(all='ignore'):
+            _run(_aligned(SIZE), _parameters(rigs), starts, float(seconds), float(tolerance), *ensemble)
+    if strict and (lost := np.flatnonzero(ensemble.ends == TOO_FAST)).size:
+        raise MotionError(f'the motion of pair {lost[0]} at t = {ensemble.durations[lost[0]]:.9g} s is too fast to '
+                          'follow')
+    return ensemble
+
+
+def spread(rig: RigParams, count: int, columns: Mapping[str, ArrayLike]) -> Rigs:
+    """The rigs of N pairs, derived defaults filled in.
+
+    Args:
+        rig: what all pairs share.
+        count: N.
+        columns: parameters that differ from pair to pair, by their (dotted) names: shape (N,) or a scalar; NaN stands
+            for the default where there is a derived one.
+
+    Raises:
+        ValueError: an unknown name, another shape, or an impossible parameter, as `accept`.
+
+    """
+    common = {field.name: lookup(rig, field.name) for field in _FIELDS}
+    values: dict[str, Any] = {}
+    if unknown := set(columns) - set(common):
+        raise ValueError(f'{", ".join(sorted(unknown))} is no parameter of a rig; known are {", ".join(common)}')
+    for name, shared in common.items():
+        value = np.asarray(columns.get(name, shared), float)
+        if value.shape not in ((), (count,)):
+            raise ValueError(f'{name} must be a scalar or of shape ({count},), got {value.shape}')
+        values[name] = np.broadcast_to(value, (count,))
+    front, rear = (WheelParams(*(values[f'{side}.{name}'] for name in WheelParams._fields)) for side in (FRONT, REAR))
+    # As `RigParams.resolved`.
+    values['S0'] = np.where(np.isnan(values['S0']), front.length, values['S0'])
+    at_rest = np.maximum(values['S0'] + front.length * each(math.sin, front.alpha), 0.0)
+    values['D0'] = np.where(np.isnan(values['D0']), at_rest, values['D0'])
+    rigs = RigParams(front, rear, *(values[name] for name in RigParams._fields[2:]))
+    if count:
+        _check(rigs)
+    return rigs
+
+
+def take(rigs: Rigs, which: Any) -> Rigs:
+    """Some of the rigs of `spread`, by an array of indices; one of them by a number."""
+    front, rear = (WheelParams(*(value[which] for value in wheel)) for wheel in (rigs.front, rigs.rear))
+    return RigParams(front, rear, *(value[which] for value in rigs[2:]))
+
+
+def each(function: Callable[[float], float], values: Any) -> Floats:
+    """A function of `math` of every value: numpy's own may round the same number in two ways, by its place."""
+    return np.fromiter(map(function, values.tolist()), float, len(values))
+
+
+def _check(rigs: Rigs) -> None:
+    """Refuse all pairs for one that `accept` refuses: one at the end of a column, or the stiffest."""
+    for field in _FIELDS:
+        column = lookup(rigs, field.name)
+        for index in (int(np.argmin(column)), int(np.argmax(column))):
+            if not field.quantity.allows(float(column[index])):
+                accept(take(rigs, index))
+    mass = 1.0 / (1.0 / rigs.front.mass + 1.0 / rigs.rear.mass)
+    fastest = STIFFEST * np.sqrt(rigs.gravity / rigs.front.length)
+    for stiffness in (rigs.k / (mass * fastest**2), rigs.b / (mass * fastest)):
+        if stiffness.max() > 1.0:
+            accept(take(rigs, int(np.argmax(stiffness))))
+
+
+def _parameters(rigs: Rigs) -> Floats:
+    """Parameter rows of each pair, shape (N, PARAMETERS), in the order of the work array."""
+    rows: Any = {}
+    work_parameters(rows, 0, rigs._replace(slope=0.0))
+    rows |= {taylor.S: rigs.S0, taylor.COS_SLOPE: each(math.cos, rigs.slope),
+             taylor.SIN_SLOPE: each(math.sin, rigs.slope)}
+    parameters = np.empty((len(rigs.k), taylor.PARAMETERS))
+    for row, value in rows.items():
+        parameters[:, _column(row)] = value
+    return parameters
+
+
+def _column(row: int) -> int:
+    return (row - taylor.FIRST_PARAMETER) // LANES
+
+
+def _aligned(size: int) -> Floats:
+    """Zeros on a cache line's boundary: a vector that straddles two lines costs twice."""
+    raw = np.zeros(size + 8)
+    offset = -raw.ctypes.data // raw.itemsize % 8
+    return raw[offset:offset + size]
+
+
+@compiled
+def _guess_strike(start: Any, rate: Any, end: Any, end_rate: Any, aim: Any, step: Any) -> Any:
+    """When a wheel comes to an angle, were time a cubic of its angle: exact at both ends of the step."""
+    part = (aim - start) / (end - start)
+    rest = 1.0 - part
+    return part * part * (3.0 - 2.0 * part) * step + part * rest * (end - start) * (rest / rate - part / end_rate)
+
+
+@compiled
+def _find_strikes(work: Any) -> None:
+    """When each wheel strikes if it rolls forward throughout its step; the step's end if it does not strike.
+
+    Newton's method, which aims at the strike or at where the step ends, whichever is nearer.
+    """
+    w = rows(work, LANES)
+    step = w[STEP]
+    end1, rate1, end2, rate2 = motion(w, step, step)
+    aim1, aim2 = minimum(end1, w[taylor.ALPHA1]), minimum(end2, w[taylor.ALPHA2])
+    time1 = _guess_strike(w[THETA1], w[OMEGA1], end1, rate1, aim1, step)
+    time2 = _guess_strike(w[THETA2], w[OMEGA2], end2, rate2, aim2, step)
+    for _ in range(NEWTON_ITERATIONS):
+        theta1, omega1, theta2, omega2 = motion(w, time1, time2)
+        correction1, correction2 = (theta1 - aim1) / omega1, (theta2 - aim2) / omega2
+        time1, time2 = time1 - correction1, time2 - correction2
+        w[MISS1], w[MISS2] = abs(correction1), abs(correction2)
+    w[STRIKE1], w[STRIKE2], w[AHEAD1], w[AHEAD2] = time1, time2, end1, end2
+    w[SLOWEST1], w[SLOWEST2] = minimum(w[OMEGA1], rate1), minimum(w[OMEGA2], rate2)
+
+
+@compiled
+def _cut_steps(w: Any) -> None:
+    """End each lane's step at its first strike; set which wheel strikes (0: none), and which way."""
+    _find_strikes(w)
+    for l in range(LANES):
+        w[WHEEL + l] = 0.0
+        for i in range(2):
+            row = i * LANES + l
+            alpha = w[taylor.ALPHA1 + row]
+            if w[SLOWEST1 + row] > 0.0 and w[MISS1 + row] < CONVERGED:
+                t, direction = max(w[STRIKE1 + row], 0.0), FORWARD if w[AHEAD1 + row] >= alpha else NONE
+            else:  # it turns back or grazes its guard
+                t, direction = first_strike(w, STATE[2 * i], STATE[2 * i + 1], l, alpha, w[STEP + l])
+            if direction != NONE and (w[WHEEL + l] == 0.0 or t < w[STEP + l]):
+                w[STEP + l], w[WHEEL + l], w[DIRECTION + l] = t, i + 1.0, direction
+
+
+@compiled
+def _acceleration(w: Any, l: int, i: int, theta: float, S: float) -> Any:
+    """The acceleration of wheel i were it at rest at an angle and a stance distance."""
+    l1, l2 = w[taylor.L1 + l], w[taylor.L2 + l]
+    theta1, theta2 = (theta, w[THETA2 + l]) if i == 0 else (w[THETA1 + l], theta)
+    p1 = l2 * math.sin(theta1 - theta2) + S * math.cos(theta1)
+    p2 = l1 * math.sin(theta1 - theta2) + S * math.cos(theta2)
+    dx, dy = l1 * math.sin(theta1) - l2 * math.sin(theta2) + S, l1 * math.cos(theta1) - l2 * math.cos(theta2)
+    length = math.sqrt(dx * dx + dy * dy)
+    rate = (-l2 * p2 * w[OMEGA2 + l] if i == 0 else l1 * p1 * w[OMEGA1 + l]) / length
+    pull = (w[taylor.K + l] * (length - w[taylor.D0 + l]) + w[taylor.B + l] * rate) / length
+    torque = -p1 * pull * w[taylor.INV_ML1 + l] if i == 0 else p2 * pull * w[taylor.INV_ML2 + l]
+    weight = math.sin(theta) * w[taylor.COS_SLOPE + l] + math.cos(theta) * w[taylor.SIN_SLOPE + l]
+    return w[taylor.G1 + i * LANES + l] * weight + torque
+
+
+@compiled
+def _rest(w: Any, l: int, i: int) -> Any:
+    """Whether wheel i, at rest on two spokes, stays so; else it is let go over the one it is pushed over.
+
+    As `Simulation`, to the same end: see `dcdrw_sim.model.dynamics.tipping`.
+    """
+    theta, row = STATE[2 * i] + l, i * LANES + l
+    alpha = w[taylor.ALPHA1 + row]
+    if w[theta] > 0.0:  # the same place, told from the forward spoke
+        w[STEPS1 + row] += 1.0
+    S, stride = _stance_distance(w, l), w[STRIDE1 + row]
+    forward, backward = _acceleration(w, l, i, -alpha, S), -_acceleration(w, l, i, alpha, S - stride)
+    if max(forward, backward) <= 0.0:
+        return True
+    way = 1.0 if forward >= backward else -1.0
+    if way < 0.0:
+        w[STEPS1 + row] -= 1.0
+    w[theta], w[STATE[2 * i + 1] + l], w[LAST1 + row] = -way * alpha, way * LEAVING_SPEED * w[SPEED1 + row], w[TIME + l]
+    return False
+
+
+@compiled
+def _stance_distance(w: Any, l: int) -> Any:
+    return w[S0 + l] + w[STEPS1 + l] * w[STRIDE1 + l] + w[STEPS2 + l] * w[STRIDE2 + l]
+
+
+@compiled
+def _load(w: Any, l: int, parameters: Any, start: Any) -> Any:
+    """Put a pair at its start into a lane; whether a wheel stands there."""
+    for row in range(taylor.PARAMETERS):
+        w[taylor.FIRST_PARAMETER + row * LANES + l] = parameters[row]
+    for row in range(TIME + l, SIZE, LANES):  # time, steps, and what happened last
+        w[row] = 0.0
+    w[THETA1 + l], w[OMEGA1 + l], w[THETA2 + l], w[OMEGA2 + l] = start
+    w[S0 + l] = w[taylor.S + l]
+    w[STRIDE1 + l] = 2.0 * w[taylor.L1 + l] * math.sin(w[taylor.ALPHA1 + l])
+    w[STRIDE2 + l] = -2.0 * w[taylor.L2 + l] * math.sin(w[taylor.ALPHA2 + l])
+    w[SPEED1 + l], w[SPEED2 + l] = math.sqrt(w[taylor.G1 + l]), math.sqrt(w[taylor.G2 + l])
+    w[UNIT + l] = 1.0 / min(w[SPEED1 + l], w[SPEED2 + l])
+    stands = False
+    for i in range(2):
+        if w[STATE[2 * i + 1] + l] == 0.0 and abs(w[STATE[2 * i] + l]) >= w[taylor.ALPHA1 + i * LANES + l]:
+            stands = _rest(w, l, i) or stands
+            w[taylor.S + l] = _stance_distance(w, l)
+    return stands
+
+
+@compiled
+def _record(w: Any, l: int, i: int, direction: int, record: Any) -> None:
+    """Note a strike of wheel i, its angle exactly on its guard."""
+    w[STATE[2 * i] + l] = direction * w[taylor.ALPHA1 + i * LANES + l]
+    record['wheel'], record['direction'], record['t'] = i + 1, direction, w[TIME + l]
+    for j in range(4):
+        record['state'][j] = w[STATE[j] + l]
+
+
+@compiled
+def _strike(w: Any, l: int, i: int, direction: int) -> int:
+    """Put wheel i on its next spoke; how the run ends with that, if it does."""
+    theta, omega, row = STATE[2 * i] + l, STATE[2 * i + 1] + l, i * LANES + l
+    w[theta], w[omega] = reset(w[taylor.ALPHA1 + row], w[omega], direction)
+    w[STEPS1 + row] += direction
+    fallen = direction == BACKWARD and w[ROLLED1 + row] == BACKWARD
+    w[LAST1 + row], w[ROLLED1 + row] = w[TIME + l], direction
+    stands = abs(w[omega]) < strikes.STANDING_SPEED * w[SPEED1 + row] and _rest(w, l, i)
+    w[taylor.S + l] = _stance_distance(w, l)
+    return FALLEN if fallen else STANDING if stands else NONE_YET
+
+
+@compiled
+def _run(work: Any, parameters: Any, starts: Any, seconds: float, tolerance: float, records: Any, counts: Any,
+         ends: Any, durations: Any) -> None:
+    """Run every pair: each lane takes the next one when its own has ended, and never waits for another."""
+    w, lanes = bare(work), rows(bare(work), LANES)
+    total, capacity = records.shape
+    following, active = 0, 0
+    for l in range(LANES):  # a lane without a pair computes something, and nobody looks
+        _load(w, l, parameters[0], starts[0])
+        w[PAIR + l] = NO_PAIR
+    while True:
+        for l in range(LANES):
+            while w[PAIR + l] == NO_PAIR and following < total:
+                if _load(w, l, parameters[following], starts[following]):
+                    ends[following] = STANDING
+                else:
+                    w[PAIR + l] = following
+                    active += 1
+                following += 1
+        if active == 0:
+            return
+        expand(w, LANES)
+        for l in range(LANES):
+            w[REACH + l] = min(step_size(w, l, tolerance), LONGEST_STEP * w[UNIT + l])
+            w[STEP + l] = max(0.0, min(w[REACH + l], seconds - w[TIME + l]))
+        _cut_steps(w)
+        lanes[THETA1], lanes[OMEGA1], lanes[THETA2], lanes[OMEGA2] = motion(lanes, lanes[STEP], lanes[STEP])
+        lanes[TIME] = lanes[TIME] + lanes[STEP]
+        for l in range(LANES):
+            if w[PAIR + l] == NO_PAIR:
+                continue
+            end, mine = NONE_YET, int(w[PAIR + l])
+            if not w[taylor.LENGTH + l] > strikes.MIN_COUPLER_LENGTH * w[taylor.L1 + l]:
+                end = HUBS_MET
+            elif not w[REACH + l] >= SHORTEST_STEP * w[UNIT + l]:
+                end = TOO_FAST
+            elif w[WHEEL + l] > 0.0:
+                i, direction = int(w[WHEEL + l]) - 1, int(w[DIRECTION + l])
+                _record(w, l, i, direction, records[mine, counts[mine]])
+                counts[mine] += 1
+                end = _strike(w, l, i, direction)
+                if end == NONE_YET and counts[mine] == capacity:
+                    end = STRIKES
+            if end == NONE_YET and w[TIME + l] >= seconds:
+                end = TIME_OVER
+            if end == NONE_YET and w[TIME + l] - min(w[LAST1 + l], w[LAST2 + l]) > strikes.STALL_TIME * w[UNIT + l]:
+                end = STALLED
+            if end != NONE_YET:
+                ends[mine], durations[mine], w[PAIR + l] = end, w[TIME + l], NO_PAIR
+                active -= 1

@@ -1,0 +1,1 @@
+"""The simulated rig and its node."""

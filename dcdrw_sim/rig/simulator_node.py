@@ -1,0 +1,169 @@
+"""The node `simulator`: the rig in simulation, in the place of the real one."""
+
+import math
+import sys
+import time
+from contextlib import suppress
+from typing import Any
+
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock as ClockMessage
+from std_srvs.srv import SetBool, Trigger
+
+from dcdrw_msgs_py.diagnosis import Diagnosis, Level
+from dcdrw_msgs_py.messages import JointSampleWriter, to_stamp
+from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
+from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.samples import SECOND
+from dcdrw_msgs_py.topics import CLOCK, COUPLER_FORCE_COMMAND, JOINT_STATES
+from dcdrw_sim.motion.pair import MotionError, accept
+from dcdrw_sim.rig.simulator import SimulatedRig, SimulatorParams, Timeline
+
+SHORTEST_TICK = 0.0005
+"""Samples that are due more often are published in bursts [s]."""
+PREPARE_WITHIN = 0.02
+"""A sample that is due so soon is prepared at once, so that it is on time [s]."""
+BURST_SECONDS = 0.02
+"""Time in one callback at most, so that services and signals are served however far behind the pace is."""
+CLOCK_RATE = 100.0
+"""Messages on /clock per simulated second at most [Hz]."""
+CLOCK_START_NS = SECOND
+"""Simulated time at the start: 0 means `no clock yet` in ROS."""
+
+
+class SimulatorNode(Node):
+    """Publishes what a `SimulatedRig` does, at the pace of the node's clock, or of its own /clock."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('simulator', **kwargs)
+        self._rig_parameters = Parameters(self, RigParams, lambda rig: self._rig.configure(rig), accept)
+        self._settings = Parameters(self, SimulatorParams, self._configure, SimulatorParams.check_pace)
+        params = self._settings.value
+        self._rig = SimulatedRig(self._rig_parameters.value, params)
+        # As its own clock's source it cannot wait for that clock.
+        self._pace_clock = steady_clock() if params.publish_clock else self.get_clock()
+        self._paused = params.paused
+        self._failure = ''
+        self._refused_commands = 0
+        self._command_age = Age()
+        self._writer = JointSampleWriter()
+        self._joint_states = advertise(self, JOINT_STATES)
+        self._clock_publisher = advertise(self, CLOCK) if params.publish_clock else None
+        listen(self, COUPLER_FORCE_COMMAND, self._on_command)
+        self.create_service(Trigger, '~/reset', self._on_reset)
+        self.create_service(SetBool, '~/pause', self._on_pause)
+        report(self, self._diagnose)
+        self._timer = self.create_timer(self._period(), self._tick, clock=steady_clock())
+        self._restart()
+        doing = 'holding the wheels' if self._paused else 'rolling'
+        self.get_logger().info(f'{doing}, {params.rate:g} samples per second')
+
+    def _now(self) -> float:
+        return float(self._pace_clock.now().nanoseconds) / SECOND
+
+    def _period(self) -> float:
+        """Time from tick to tick [s]: a sample's, as far as a timer can follow."""
+        params = self._settings.value
+        pace = params.rate * params.real_time_factor
+        return max(1.0 / pace, SHORTEST_TICK) if pace else SHORTEST_TICK
+
+    def _restart(self) -> None:
+        params = self._settings.value
+        self._last_now = self._now()
+        # Samples fall due when the timer does: each is published as soon as it is due.
+        first_tick = self._last_now + self._timer.time_until_next_call() / SECOND
+        self._epoch_ns = CLOCK_START_NS if params.publish_clock else round(first_tick * SECOND)
+        self._timeline = Timeline(params.rate, params.real_time_factor, first_tick)
+        self._next_clock = -math.inf
+
+    def _tick(self) -> None:
+        now = self._now()
+        if now < self._last_now:  # the clock that this node follows was set back
+            self._restart()
+        self._last_now = now
+        if self._failure or (self._paused and self._clock_publisher):  # simulated time stands still
+            self._timeline.restart_clock(now)
+            return
+        stale = self._command_age.seconds > self._settings.value.command_timeout
+        if stale and self._rig.simulation.external_force:
+            self._rig.simulation.external_force = 0.0
+        reached = self._timeline.reached(now)
+        end = time.monotonic() + BURST_SECONDS
+        while self._timeline.due <= reached and not self._failure and time.monotonic() < end:
+            self._publish()
+        if not self._paused and self._period() <= PREPARE_WITHIN:
+            with suppress(MotionError):  # told when the sample is due
+                self._rig.simulation.prepare(self._timeline.rig_time)
+
+    def _publish(self) -> None:
+        timeline = self._timeline
+        due = timeline.due
+        stamp_ns = self._epoch_ns + round(due * SECOND)
+        try:
+            sample = self._rig.read(timeline.rig_time, stamp_ns, self._paused)
+        except MotionError as error:
+            self._failure = str(error)
+            self.get_logger().error(f'stopped: {error}; ~/reset starts again')
+            return
+        if self._clock_publisher and due >= self._next_clock:
+            self._clock_publisher.publish(ClockMessage(clock=to_stamp(stamp_ns)))
+            self._next_clock = due + 1.0 / CLOCK_RATE - 1e-9
+        if sample:
+            self._joint_states.publish(self._writer.write(sample))
+        timeline.step(self._paused)
+
+    def _configure(self, params: SimulatorParams) -> None:
+        self._rig.params = params
+        self._timeline.configure(params.rate, params.real_time_factor, self._now())
+        self._timer.timer_period_ns = round(self._period() * SECOND)
+
+    def _on_command(self, message: Any) -> None:
+        try:
+            self._rig.simulation.external_force = message.data
+        except ValueError as error:
+            self._refused_commands += 1
+            self.get_logger().warning(f'coupler_force_command: {error}', throttle_duration_sec=1.0)
+            return
+        self._command_age.renew()
+
+    def _on_reset(self, request: Any, response: Any) -> Any:
+        try:
+            self._rig.reset()
+        except ValueError as error:
+            response.success, response.message = False, str(error)
+            return response
+        self._failure = ''
+        self._restart()
+        response.success, response.message = True, 'the wheels are back at their start'
+        return response
+
+    def _on_pause(self, request: Any, response: Any) -> Any:
+        self._paused = request.data
+        response.success, response.message = True, 'paused' if request.data else 'running'
+        return response
+
+    def _diagnose(self) -> Diagnosis:
+        simulation = self._rig.simulation
+        level, message = Level.OK, 'paused' if self._paused else 'running'
+        standing = [name for name, stands in zip(('front', 'rear'), simulation.standing, strict=True) if stands]
+        if self._failure:
+            level, message = Level.ERROR, self._failure
+        elif standing:
+            level, message = Level.WARN, f'the {" and the ".join(standing)} wheel stands still on two spokes'
+        behind = self._timeline.reached(self._now()) - self._timeline.due
+        return Diagnosis(level, message, {
+            'simulated time': f'{simulation.time:.3f} s',
+            'behind the pace': f'{max(behind, 0.0):.3f} s' if math.isfinite(behind) else 'as fast as possible',
+            'n': str(simulation.steps[0] - simulation.steps[1]),
+            'external force': f'{simulation.external_force:g} N',
+            'commands refused': str(self._refused_commands),
+        })
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node."""
+    return run('simulator', SimulatorNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Many rigs judged: sweeps, regimes, designs."""

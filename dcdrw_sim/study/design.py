@@ -1,0 +1,342 @@
+"""Choosing the coupler: search for the k and b that synchronize a rig fastest from the worst of its starts.
+
+A coupler is judged as a trial is: by the steps until θ2 at the section stays within a band, from each of several
+initial phases. The worst start counts; what does not settle from every start is ranked by what becomes of it.
+"""
+
+import math
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dcdrw_msgs_py.rig import RigParams
+from dcdrw_sim.map.regression import PHASES
+from dcdrw_sim.model.dynamics import gentlest_slope
+from dcdrw_sim.model.start import start_state
+from dcdrw_sim.motion.ensemble import Rigs, spread, take
+from dcdrw_sim.study.points import judge_points, run_starts, section_room, wheels_of
+from dcdrw_sim.study.verdict import Verdict, judge
+
+Floats = NDArray[np.float64]
+
+TOLERANCE = 0.3
+"""What one buys may differ from what it says by this part."""
+EASE = 0.1
+"""The slope may be gentler than it was thought to be by this part."""
+BLOCK = 64
+"""Rigs of a piece of work: a fraction of a second."""
+GRID = 41
+"""Couplers along each axis of the first search."""
+ZOOM = 9
+"""Couplers along each axis of a later search, around the best so far, two cells wide on either side."""
+ZOOMS = 3
+CASES = 18
+"""What a coupler may turn out to be: k and b as they should be or off either way, the slope too or gentler."""
+WORK = 2 * GRID**2 + ZOOMS * ZOOM**2 * (1 + CASES)
+"""Couplers that a search scores."""
+WIDEST = 8.0
+"""Margins are looked for up to this factor."""
+MARGIN_STEPS = 12
+"""Factors tried each way, at every look."""
+LOOKS = 3
+"""Each narrows down the gap that the last one found: an edge is known to about 0.1 %."""
+VARIED = ('k', 'b', 'mass', 'slope')
+"""What a rig may be other than it was thought to be."""
+
+
+class Task(NamedTuple):
+    """What couplers are judged by."""
+
+    rig: RigParams
+    """Its k and b do not matter."""
+    seconds: float
+    """How long a trial may last."""
+    band: float
+    """|θ2| at the section is to be within this [rad]."""
+    phases: tuple[float, ...] = PHASES
+    """Starts, in steps."""
+
+
+class Scores(NamedTuple):
+    """How N couplers do, each array of shape (N,)."""
+
+    k: Floats
+    """[N/m]"""
+    b: Floats
+    """[N·s/m]"""
+    verdict: NDArray[np.int8]
+    """Of the worst start."""
+    settles: Floats
+    """Part of the starts that settle."""
+    steps: Floats
+    """From the worst start; NaN where not every start settles."""
+    mean_steps: Floats
+    """Of all starts; NaN where not every one settles."""
+    time: Floats
+    """From the worst start [s]; NaN where not every start settles."""
+
+    def order(self) -> NDArray[np.int64]:
+        """The couplers' indices from the best to the worst."""
+        return np.lexsort((self.b, self.k, self.time, self.mean_steps, self.steps, -self.settles, self.verdict))
+
+
+class Margin(NamedTuple):
+    """By which factors a parameter may change, the others left, with every start still settling."""
+
+    low: float
+    high: float
+    low_verdict: Verdict | None
+    """What comes of less; None where nothing does down to 1/WIDEST."""
+    high_verdict: Verdict | None
+    """What comes of more; None where nothing does up to WIDEST."""
+
+
+class Variation(NamedTuple):
+    """How a coupler does where one thing differs."""
+
+    parameter: str
+    factor: float
+    verdict: Verdict
+    """Of the worst start."""
+    steps: float
+    """From the worst start; NaN where not every start settles."""
+
+
+class Assessment(NamedTuple):
+    """All that is told of one coupler."""
+
+    k: float
+    b: float
+    verdict: Verdict
+    steps: tuple[float, ...]
+    """From each start; NaN where it does not settle."""
+    time: float
+    """From the worst start [s]."""
+    paths: Floats
+    """θ2 at the sections [rad] from each start, shape (starts, sections); NaN after the last."""
+    cycle_theta2: float
+    """On the limit cycle [rad]; NaN where there is none."""
+    multiplier: float
+    """What a step leaves of a small error, on the limit cycle."""
+    speed: float
+    """On the limit cycle [m/s]."""
+    damper_loss: float
+    """On the limit cycle [J/m]."""
+    sensitivity: tuple[Variation, ...]
+    margins: dict[str, Margin]
+
+    @property
+    def worst_steps(self) -> float:
+        """From the worst start; NaN where not every start settles."""
+        return max(self.steps) if not any(map(math.isnan, self.steps)) else math.nan
+
+
+class Search(NamedTuple):
+    """The outcome of a search."""
+
+    grid: Scores
+    """The couplers of the first look, k running slowest."""
+    fastest: tuple[float, float]
+    """k and b of fewest steps from the worst start."""
+    forgiving: tuple[float, float]
+    """k and b of fewest steps from the worst start where k, b and slope may be off, as `forgiving_order`."""
+
+
+Report = Callable[[int], object]
+
+
+def score(task: Task, k: Floats, b: Floats, slope: Floats | None = None,
+          report: Report = lambda count: None) -> Scores:
+    """Judge couplers, on all cores.
+
+    Args:
+        task: rig and starts.
+        k: shape (N,) [N/m].
+        b: shape (N,) [N·s/m].
+        slope: shape (N,) [rad]; that of the rig by default.
+        report: told how many more are done.
+
+    Raises:
+        ValueError: an impossible rig.
+
+    """
+    slopes = np.full(len(k), task.rig.slope) if slope is None else slope
+    return Scores(k, b, *_score(task, spread(task.rig, len(k), {'k': k, 'b': b, 'slope': slopes}), report))
+
+
+def search(task: Task, k: tuple[float, float], b: tuple[float, float], tolerance: float = TOLERANCE,
+           report: Report = lambda count: None) -> Search:
+    """Find the best couplers within bounds: on a logarithmic grid, then on ever finer ones around the best so far.
+
+    Args:
+        task: rig and starts.
+        k: least and greatest stiffness [N/m].
+        b: least and greatest damping [N·s/m].
+        tolerance: by which part k and b may be off for the forgiving one, in [0, 1).
+        report: told how many more couplers are done; `WORK` tells how many there are.
+
+    Raises:
+        ValueError: an impossible rig or bounds, or wheels that do not roll by themselves.
+
+    """
+    if not (0.0 < k[0] <= k[1] and 0.0 < b[0] <= b[1]):
+        raise ValueError(f'bounds must be 0 < least ≤ greatest, got {k} N/m and {b} N·s/m')
+    start_state(task.rig, 0.0)  # says why where no wheel rolls
+    grid = score(task, *mesh(k, b), report=report)
+    eased = score(task, grid.k, grid.b, np.full(GRID**2, (1.0 - EASE) * task.rig.slope), report)
+
+    def fastest(k: Floats, b: Floats) -> NDArray[np.int64]:
+        return score(task, k, b, report=report).order()
+
+    def forgiving(k: Floats, b: Floats) -> NDArray[np.int64]:
+        return forgiving_order(task, k, b, tolerance, report)
+
+    start, near = grid.order()[0], _blunt_order(grid, eased)[0]
+    return Search(grid, _zoom(fastest, (grid.k[start], grid.b[start]), k, b),
+                  _zoom(forgiving, (grid.k[near], grid.b[near]), k, b))
+
+
+def mesh(k: tuple[float, float], b: tuple[float, float]) -> tuple[Floats, Floats]:
+    """The couplers of the first look within bounds: GRID × GRID, k running slowest."""
+    return _mesh(np.geomspace(*k, GRID), np.geomspace(*b, GRID))
+
+
+def forgiving_order(task: Task, k: Floats, b: Floats, tolerance: float,
+                    report: Report = lambda count: None) -> NDArray[np.int64]:
+    """The couplers' indices, best first, each as good as the worst that it may turn out to be.
+
+    That is k and b each off by the tolerance either way, and the slope gentler by EASE.
+    """
+    factors = (1.0 - tolerance, 1.0, 1.0 + tolerance)
+    cases = [(k_factor, b_factor, slope) for k_factor in factors for b_factor in factors
+             for slope in (task.rig.slope, (1.0 - EASE) * task.rig.slope)]
+    scores = score(
+        task, np.concatenate([case[0] * k for case in cases]), np.concatenate([case[1] * b for case in cases]),
+        np.repeat([case[2] for case in cases], len(k)), report)
+    return _worst_of(scores, np.arange(len(scores.k)).reshape(CASES, -1))
+
+
+def assess(task: Task, k: float, b: float, tolerance: float = TOLERANCE) -> Assessment:
+    """Tell all of one coupler.
+
+    Raises:
+        ValueError: an impossible coupler or rig, or one whose wheels do not roll by themselves.
+
+    """
+    rig = task.rig._replace(k=k, b=b)
+    found = judge_points(spread(rig, 1, {}), task.seconds, task.phases, task.band)
+    return Assessment(
+        k, b, Verdict(int(found['verdict'][0])), tuple(found['start_steps'][0].tolist()), float(found['time'][0]),
+        found['section_theta2'][0], float(found['cycle_theta2'][0]), float(found['multipliers'][0, 0]),
+        float(found['speed'][0]), float(found['damper_loss'][0]), tuple(_sensitivity(task, rig, tolerance)),
+        {name: _margin(task, rig, name) for name in VARIED})
+
+
+def _sensitivity(task: Task, rig: RigParams, tolerance: float) -> Iterator[Variation]:
+    for name in VARIED:
+        for factor in (1.0 - tolerance, 1.0 + tolerance):
+            verdict, _, steps, *_ = _score(task, _multiplied(rig, name, np.array([factor])))
+            yield Variation(name, factor, Verdict(int(verdict[0])), float(steps[0]))
+
+
+def _margin(task: Task, rig: RigParams, name: str) -> Margin:
+    """Both edges, by the factors next to the coupler that spoil it; each look narrows the last one's gap."""
+    (low, below), (high, above) = (_edge(task, rig, name, limit) for limit in (1.0 / WIDEST, WIDEST))
+    return Margin(low, high, below, above)
+
+
+def _edge(task: Task, rig: RigParams, name: str, limit: float) -> tuple[float, Verdict | None]:
+    good, spoilt, verdict = 1.0, limit, None
+    if name == 'slope':  # steeper than α no wheel stands on a spoke
+        spoilt = min(limit, min(rig.front.alpha, rig.rear.alpha) / rig.slope * (1 - 1e-9))
+    for _ in range(LOOKS):
+        factors = np.geomspace(good, spoilt, MARGIN_STEPS + 1)
+        verdicts = _score(task, _multiplied(rig, name, factors))[0]
+        bad = np.flatnonzero(verdicts > Verdict.SETTLES)
+        if not bad.size:
+            return spoilt, verdict
+        first = int(bad[0])
+        verdict = Verdict(int(verdicts[first]))
+        if first == 0:
+            return good, verdict
+        good, spoilt = float(factors[first - 1]), float(factors[first])
+    return good, verdict
+
+
+def _multiplied(rig: RigParams, name: str, factors: Floats) -> Rigs:
+    """Rigs with one of VARIED times each factor; the mass is that of both wheels."""
+    if name == 'mass':
+        return spread(rig, len(factors), {'front.mass': factors * rig.front.mass, 'rear.mass': factors * rig.rear.mass})
+    return spread(rig, len(factors), {name: factors * getattr(rig, name)})
+
+
+def _score(task: Task, rigs: Rigs, report: Report = lambda count: None) -> tuple[NDArray[Any], ...]:
+    """The columns of `Scores` behind k and b."""
+    count = len(rigs.k)
+    gentlest = [max(gentlest_slope(front), gentlest_slope(rear)) for front, rear, *_ in wheels_of(rigs)]
+    rolling = np.flatnonzero(rigs.slope > gentlest)
+    verdict, settles = np.full(count, Verdict.STALLS, np.int8), np.zeros(count)  # what becomes of those that do not
+    columns: tuple[NDArray[Any], ...] = (verdict, settles, *(np.full(count, math.nan) for _ in range(3)))
+    if rolling.size:
+        room = section_room(take(rigs, rolling), task.seconds)
+        pieces = np.array_split(rolling, math.ceil(rolling.size / BLOCK))
+        executor = ThreadPoolExecutor(len(os.sched_getaffinity(0)))  # the kernels let go of Python's lock
+        try:
+            scored = executor.map(lambda piece: _score_piece(task, take(rigs, piece), room), pieces)
+            for piece, results in zip(pieces, scored, strict=True):
+                for column, result in zip(columns, results, strict=True):
+                    column[piece] = result
+                report(len(piece))
+        finally:
+            executor.shutdown(cancel_futures=True)
+    report(count - rolling.size)
+    return columns
+
+
+def _score_piece(task: Task, rigs: Rigs, room: int) -> tuple[NDArray[Any], ...]:
+    pairs, ensemble = run_starts(rigs, task.seconds, task.phases, room)
+    judgement, _ = judge(ensemble, pairs, 1, task.band)
+    verdicts, steps, time = (
+        value.reshape(-1, len(task.phases)) for value in (judgement.verdict, judgement.steps, judgement.time))
+    return (verdicts.max(axis=1), (verdicts == Verdict.SETTLES).mean(axis=1), steps.max(axis=1), steps.mean(axis=1),
+            time.max(axis=1))
+
+
+def _zoom(order: Callable[[Floats, Floats], NDArray[np.int64]], best: tuple[float, float], k: tuple[float, float],
+          b: tuple[float, float]) -> tuple[float, float]:
+    """The best coupler, on ever finer grids around the best so far."""
+    reaches = [2.0 * math.log(high / low) / (GRID - 1) for low, high in (k, b)]
+    for _ in range(ZOOMS):
+        axes = [np.clip(value * np.exp(np.linspace(-reach, reach, ZOOM)), *bounds)
+                for value, reach, bounds in zip(best, reaches, (k, b), strict=True)]
+        ks, bs = _mesh(*axes)
+        first = order(ks, bs)[0]
+        best = float(ks[first]), float(bs[first])
+        reaches = [reach / (ZOOM // 2) * 1.5 for reach in reaches]
+    return best
+
+
+def _blunt_order(*grids: Scores) -> NDArray[np.int64]:
+    """The grid's couplers, each as good as the worst of its neighbours on all the grids."""
+    both = Scores(*map(np.concatenate, zip(*grids, strict=True)))
+    places = np.arange(len(both.k)).reshape(len(grids), GRID, GRID)
+    padded = np.pad(places, ((0, 0), (1, 1), (1, 1)), mode='edge')
+    return _worst_of(both, np.concatenate(
+        [padded[:, i:i + GRID, j:j + GRID].reshape(len(grids), -1) for i in range(3) for j in range(3)]))
+
+
+def _worst_of(scores: Scores, members: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The order of groups by their worst member; members of shape (of a group, groups)."""
+    rank = np.empty(len(scores.k), np.int64)
+    order = scores.order()
+    rank[order] = np.arange(len(order))
+    return np.argsort(rank[members].max(axis=0), kind='stable')
+
+
+def _mesh(k: Floats, b: Floats) -> tuple[Floats, Floats]:
+    ks, bs = np.meshgrid(k, b, indexing='ij')
+    return ks.ravel(), bs.ravel()

@@ -1,0 +1,173 @@
+"""Many rigs judged at once: each from several starts, with its limit cycle and both regressions."""
+
+import math
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dcdrw_msgs_py.rig import RigParams, WheelParams
+from dcdrw_sim.map.limit_cycles import LimitCycles, find_limit_cycles, losses
+from dcdrw_sim.map.regression import PHASES, fit_affine, fit_raw
+from dcdrw_sim.map.return_map import Complexes, spectrum
+from dcdrw_sim.model.dynamics import limit_cycle_speed
+from dcdrw_sim.model.start import start_state
+from dcdrw_sim.motion.ensemble import Ensemble, Rigs, run_pairs, take
+from dcdrw_sim.study.verdict import BAND, Judgement, Sections, Verdict, judge
+
+Floats = NDArray[np.float64]
+Wheels = tuple[WheelParams, WheelParams, float, float]
+"""What an uncoupled limit cycle depends on: front and rear wheel, slope and gravity."""
+
+ROCKING = 200
+"""Room for the strikes of two wheels that rock until they stand: each about ln(1e-6)/ln(cos 30°) = 96."""
+
+
+def judge_points(rigs: Rigs, seconds: float, phases: tuple[float, ...] = PHASES, band: float = BAND,
+                 room: int | None = None) -> dict[str, NDArray[Any]]:
+    """Every variable that `dcdrw_sim.study.sweep_dataset.VARIABLES` describes, for N rigs.
+
+    The result of a rig depends on no other.
+
+    Args:
+        rigs: as `dcdrw_sim.motion.ensemble.spread` gives them.
+        seconds: how long to simulate.
+        phases: starts, as `ReturnMap.at_phase`: the front wheel about to strike.
+        band: |θ2| at the section is to be within this [rad].
+        room: how many sections of a motion to keep; by default `section_room`.
+
+    Returns:
+        Arrays of shape (N, ...), by name; as many sections as the longest motion has.
+
+    Raises:
+        ValueError: an uncoupled wheel does not roll, and so no phase tells where to start.
+
+    """
+    count, starts = len(rigs.k), len(phases)
+    room = section_room(rigs, seconds) if room is None else room
+    pairs, ensemble = run_starts(rigs, seconds, phases, room)
+    judgement, sections = judge(ensemble, pairs, room, band)
+    # What walks on without a slip comes back to the section of the map.
+    walks = (judgement.verdict <= Verdict.ELSEWHERE) & (judgement.slips == 0) & (judgement.sections > 1)
+    lasts = np.minimum(judgement.sections, room)
+    longest = int(lasts.max(initial=1))
+    cycles = find_limit_cycles(rigs, _guesses(sections, lasts, walks, starts))
+    return {
+        **_of_points(judgement, starts), **_of_cycles(rigs, cycles), **_regressions(sections, lasts, walks, starts),
+        **{f'start_{name}': value.reshape(count, starts) for name, value in judgement._asdict().items()},
+        **{f'section_{name}': value[:, :longest].reshape(count, starts, longest)
+           for name, value in sections._asdict().items()}}
+
+
+def run_starts(rigs: Rigs, seconds: float, phases: tuple[float, ...], room: int) -> tuple[Rigs, Ensemble]:
+    """The motions of N rigs from every start, and the rig of each motion; arguments as of `judge_points`."""
+    states = np.concatenate([_start_states(*wheels, phases) for wheels in wheels_of(rigs)])
+    pairs = take(rigs, np.repeat(np.arange(len(rigs.k)), len(phases)))
+    return pairs, run_pairs(pairs, states, seconds, 2 * room + ROCKING, strict=False)
+
+
+def section_room(rigs: Rigs, seconds: float) -> int:
+    """Room for more sections than a motion goes through: all steps at the fastest that an uncoupled wheel rolls.
+
+    Raises:
+        ValueError: one does not roll.
+
+    """
+    fastest = max((_fastest(*wheels) for wheels in set(wheels_of(rigs))), default=0.0)
+    return math.ceil(fastest * seconds) + 2
+
+
+def wheels_of(rigs: Rigs) -> Iterator[Wheels]:
+    """The wheels of every rig, with its slope and gravity."""
+    for front, rear, slope, gravity in zip(
+            zip(*rigs.front, strict=True), zip(*rigs.rear, strict=True), rigs.slope, rigs.gravity, strict=True):
+        yield WheelParams(*map(float, front)), WheelParams(*map(float, rear)), float(slope), float(gravity)
+
+
+def _fastest(front: WheelParams, rear: WheelParams, slope: float, gravity: float) -> float:
+    """Steps per second of the faster wheel, were it always at its fastest."""
+    rates = [float(limit_cycle_speed(wheel, slope, gravity, wheel.alpha)) / (2.0 * wheel.alpha)
+             for wheel in (front, rear)]
+    if any(map(math.isnan, rates)):
+        start_state(RigParams(front, rear, slope=slope, gravity=gravity), 0.0)  # says why
+    return max(rates)
+
+
+def starts(rig: RigParams, phases: ArrayLike, speeds: ArrayLike = 1.0) -> Floats:
+    """Both wheels on their uncoupled limit cycles, the front one about to strike; shape (..., 4).
+
+    Args:
+        rig: the rig, on a slope on which its wheels roll by themselves.
+        phases: p in [0, 1), in steps: θ2 = α2 (1 − 2 p).
+        speeds: of both wheels, as parts of those of the limit cycles; broadcast against the phases.
+
+    """
+    front, rear = rig.front, rig.rear
+    part, speed = np.broadcast_arrays(np.asarray(phases, float), np.asarray(speeds, float))
+    theta2 = rear.alpha * (1.0 - 2.0 * part)
+    omega1 = limit_cycle_speed(front, rig.slope, rig.gravity) / math.cos(2.0 * front.alpha)
+    omega2 = limit_cycle_speed(rear, rig.slope, rig.gravity, theta2)
+    return np.stack([np.full_like(theta2, front.alpha), omega1 * speed, theta2, omega2 * speed], axis=-1)
+
+
+@lru_cache(maxsize=1024)
+def _start_states(front: WheelParams, rear: WheelParams, slope: float, gravity: float,
+                  phases: tuple[float, ...]) -> Floats:
+    """As `starts`, shape (starts, 4)."""
+    return starts(RigParams(front, rear, slope=slope, gravity=gravity), phases)
+
+
+def _of_points(judgement: Judgement, starts: int) -> dict[str, NDArray[Any]]:
+    """What the starts of each point have in common."""
+    verdicts, enters, steps, time = (value.reshape(-1, starts) for value in (
+        judgement.verdict, judgement.enters, judgement.steps, judgement.time))
+    return {'verdict': verdicts.max(axis=1), 'settles': (verdicts == Verdict.SETTLES).mean(axis=1),
+            'enters': enters.mean(axis=1), 'steps': steps.max(axis=1), 'time': time.max(axis=1)}
+
+
+def _of_cycles(rigs: Rigs, cycles: LimitCycles) -> dict[str, NDArray[Any]]:
+    """The limit cycles."""
+    walking = losses(rigs, cycles)
+    omega1, theta2, omega2 = cycles.states.T
+    return {
+        'cycle_omega1': omega1, 'cycle_theta2': theta2, 'cycle_omega2': omega2, 'cycle_period': cycles.periods,
+        'stable': cycles.stable, 'speed': walking.speed, 'strike_loss': walking.strikes, 'damper_loss': walking.damper,
+        **_polar('multiplier', cycles.multipliers)}
+
+
+def _regressions(sections: Sections, lasts: NDArray[np.int64], walks: NDArray[np.bool_],
+                 starts: int) -> dict[str, NDArray[Any]]:
+    """Both regressions, of the motions that walk."""
+    count = len(walks) // starts
+    states = np.stack([sections.omega1, sections.theta2, sections.omega2, sections.coupler_length], axis=-1)
+    variables: dict[str, NDArray[Any]] = {}
+    for name, fit, size in (('raw', fit_raw, 4), ('affine', fit_affine, 3)):
+        matrices, ranks = np.full((count, size, size), math.nan), np.zeros(count, np.int8)
+        for point in range(count):
+            which = [pair for pair in range(point * starts, (point + 1) * starts) if walks[pair]]
+            if which:
+                found = fit(states[pair, :lasts[pair], :size] for pair in which)
+                matrices[point], ranks[point] = found.matrix, found.rank
+        values = np.full((count, size), complex(math.nan, math.nan))
+        values[ranks > 0] = spectrum(matrices[ranks > 0])
+        variables |= _polar(f'{name}_eigenvalue', values) | {f'{name}_rank': ranks}
+    return variables
+
+
+def _polar(name: str, values: Complexes) -> dict[str, NDArray[Any]]:
+    """Complex numbers by modulus and angle."""
+    return {f'{name}s': np.hypot(values.real, values.imag), f'{name}_angles': np.arctan2(values.imag, values.real)}
+
+
+def _guesses(sections: Sections, lasts: NDArray[np.int64], walks: NDArray[np.bool_], starts: int) -> Floats:
+    """Where to search each point's limit cycle: the last section of the motion that changed least there."""
+    states = np.stack([sections.omega1, sections.theta2, sections.omega2], axis=-1)
+    rows = np.arange(len(lasts))
+    last, before = (states[rows, np.maximum(lasts - back, 0)] for back in (1, 2))
+    change = np.where(walks, abs(last[:, 1] - before[:, 1]), math.inf).reshape(-1, starts)
+    best = change.argmin(axis=1)
+    guesses: Floats = last.reshape(-1, starts, 3)[np.arange(len(best)), best]
+    guesses[~walks.reshape(-1, starts).any(axis=1)] = math.nan
+    return guesses

@@ -1,0 +1,1 @@
+"""From wheel rotations to phase and synchronization."""

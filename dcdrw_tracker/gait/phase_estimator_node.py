@@ -1,0 +1,66 @@
+"""The node `phase_estimator`: joint states in; phase, step difference and footfalls out."""
+
+import sys
+from typing import Any
+
+from rclpy.node import Node
+from std_msgs.msg import Float64, Int32
+
+from dcdrw_msgs_py.diagnosis import Diagnosis
+from dcdrw_msgs_py.messages import JointSampleReader, PhaseSampleWriter, footfall_message
+from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run
+from dcdrw_msgs_py.topics import FOOTFALLS, JOINT_STATES, PHASE_STATE, PHI, STEP_DIFFERENCE
+from dcdrw_tracker.gait.diagnostics import diagnose_phase
+from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams
+
+STALE_AFTER = 1.0
+"""Age of the last accepted sample from which the input is stale [s]."""
+
+
+class PhaseEstimatorNode(Node):
+    """Converts messages for the `PhaseEstimator`."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('phase_estimator', **kwargs)
+        parameters = Parameters(self, PhaseParams, lambda params: self._estimator.configure(params))
+        params = parameters.value
+        self._estimator = PhaseEstimator(params)
+        self._reader = JointSampleReader(params.front_joint, params.rear_joint, params.coupler_joint)
+        self._writer = PhaseSampleWriter()
+        self._phase = advertise(self, PHASE_STATE)
+        self._phi = advertise(self, PHI)
+        self._step_difference = advertise(self, STEP_DIFFERENCE)
+        self._footfalls = advertise(self, FOOTFALLS)
+        self._age = Age()
+        report(self, self._diagnose)
+        listen(self, JOINT_STATES, self._on_joints)
+        self.get_logger().info(f'waiting for the joints {params.front_joint} and {params.rear_joint}')
+
+    def _on_joints(self, message: Any) -> None:
+        try:
+            joints = self._reader.read(message)
+        except ValueError as error:
+            self._estimator.refuse('unreadable')
+            self.get_logger().warning(f'joint_states: {error}', throttle_duration_sec=1.0)
+            return
+        update = self._estimator.update(joints, self.get_clock().now().nanoseconds)
+        if update is None:
+            return
+        self._age.renew()
+        self._phase.publish(self._writer.write(update.phase))
+        self._phi.publish(Float64(data=update.phase.phi.angle))
+        self._step_difference.publish(Int32(data=update.phase.step_difference))
+        for footfall in update.footfalls:
+            self._footfalls.publish(footfall_message(footfall))
+
+    def _diagnose(self) -> Diagnosis:
+        return diagnose_phase(self._estimator.status(), self._age.seconds, STALE_AFTER)
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node."""
+    return run('phase_estimator', PhaseEstimatorNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

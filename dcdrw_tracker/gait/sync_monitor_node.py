@@ -1,0 +1,76 @@
+"""The node `sync_monitor`: phase in; synchronization error, verdict and diagnosis out."""
+
+import sys
+from typing import Any
+
+from rclpy.node import Node
+from std_msgs.msg import Bool, Float64
+
+from dcdrw_msgs_py.diagnosis import Diagnosis
+from dcdrw_msgs_py.messages import PhaseSampleReader
+from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
+from dcdrw_msgs_py.topics import PHASE_STATE, SYNC_ERROR, SYNC_ERROR_PERCENT, SYNCHRONIZED
+from dcdrw_tracker.gait.diagnostics import diagnose_sync
+from dcdrw_tracker.gait.sync import SyncMonitor, SyncParams
+
+WATCH_SECONDS = 0.1
+"""How often the age of the input is looked at."""
+
+
+class SyncMonitorNode(Node):
+    """Converts messages for the `SyncMonitor`."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('sync_monitor', **kwargs)
+        self._settings = Parameters(self, SyncParams, lambda params: self._monitor.configure(params))
+        self._monitor = SyncMonitor(self._settings.value)
+        self._reader = PhaseSampleReader()
+        self._error = advertise(self, SYNC_ERROR)
+        self._error_percent = advertise(self, SYNC_ERROR_PERCENT)
+        self._synchronized = advertise(self, SYNCHRONIZED)
+        self._unreadable = 0
+        self._age = Age()
+        self._verdict: bool | None = None
+        self._tell(False)
+        report(self, self._diagnose)
+        self.create_timer(WATCH_SECONDS, self._watch, clock=steady_clock())
+        listen(self, PHASE_STATE, self._on_phase)
+
+    def _on_phase(self, message: Any) -> None:
+        try:
+            sync = self._monitor.update(self._reader.read(message))
+        except ValueError as error:
+            sync = None
+            self.get_logger().warning(f'phase_state: {error}', throttle_duration_sec=1.0)
+        if sync is None:
+            self._unreadable += 1
+            return
+        self._age.renew()
+        self._error.publish(Float64(data=sync.error))
+        self._error_percent.publish(Float64(data=sync.error_percent))
+        self._tell(sync.synchronized)
+
+    def _watch(self) -> None:
+        """Nobody knows whether a pair that is not seen is still in step."""
+        if self._verdict and self._age.seconds > self._settings.value.stale_after:
+            self._tell(False)
+
+    def _tell(self, synchronized: bool) -> None:
+        if synchronized != self._verdict:
+            self._verdict = synchronized
+            self._synchronized.publish(Bool(data=synchronized))
+            self.get_logger().info(self._diagnose().message)
+
+    def _diagnose(self) -> Diagnosis:
+        diagnosis = diagnose_sync(self._monitor.status(), self._age.seconds, self._settings.value.stale_after)
+        diagnosis.values['samples refused'] = str(self._unreadable)
+        return diagnosis
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node."""
+    return run('sync_monitor', SyncMonitorNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""The node `tag_tracker` and its sources of pictures."""

@@ -1,0 +1,1 @@
+"""AprilTags in pictures: detection, following, and the view of a wheel."""

@@ -1,0 +1,1 @@
+"""From tags or poses to unbounded wheel rotations."""

@@ -1,0 +1,69 @@
+"""`dcdrw design` as a user runs it."""
+
+import json
+
+import pytest
+
+from dcdrw.cli import main
+from dcdrw.commands.design import read_parts
+
+PARTS = """\
+kind,value,name
+spring,5.25,soft
+spring,12,firm
+dashpot,8,thin
+dashpot,100,thick
+"""
+
+
+@pytest.fixture
+def parts(tmp_path):
+    path = tmp_path / 'parts.csv'
+    path.write_text(PARTS)
+    return path
+
+
+def test_best_pair_of_parts_with_card_and_numbers(tmp_path, parts, capsys):
+    assert main(['design', '--available', str(parts), '--k', '5.25', '--b', '100', '--out', str(tmp_path / 'out')]) == 0
+    output = capsys.readouterr().out
+    assert 'fastest          k = 12 N/m, b = 8 N·s/m' in output
+    assert 'firm, thin' in output
+    assert '45 from the worst start' in output  # the paper's own coupler
+    found = json.loads((tmp_path / 'out' / 'design.json').read_text())
+    assert found['couplers']['fastest']['spring'] == 'firm'
+    assert found['couplers']['given']['worst_steps'] == 45
+    assert found['couplers']['given']['multiplier'] == pytest.approx(0.9411, abs=1e-4)
+    assert found['task']['band_percent'] == pytest.approx(6.0)
+    assert (tmp_path / 'out' / 'card.pdf').read_bytes().startswith(b'%PDF')
+    assert (tmp_path / 'out' / 'card.png').read_bytes().startswith(b'\x89PNG')
+
+
+@pytest.mark.parametrize(('content', 'message'), [
+    ('', 'header'),
+    ('kind,value\nspring,5\n', 'no dashpot'),
+    ('kind,value\nrope,5\n', 'line 2: kind must be spring or dashpot'),
+    ('kind,value\nspring,stiff\n', "line 2: value must be a number, got 'stiff'"),
+    ('kind,value\nspring,-1\n', 'line 2: value must be > 0'),
+    ('kind,value\nspring\n', 'line 2: value must be a number'),
+])
+def test_wrong_parts_are_named(tmp_path, content, message):
+    path = tmp_path / 'parts.csv'
+    path.write_text(content)
+    with pytest.raises(ValueError, match=message):
+        read_parts(path)
+
+
+@pytest.mark.parametrize(('arguments', 'message'), [
+    (['--k', '5'], '--k and --b together'),
+    (['--slope-deg', '1'], 'too gentle'),
+    (['--spokes', '3'], 'spokes'),
+    (['--tolerance', '100'], 'below 100 %'),
+    (['--band', '50'], 'below 50 %'),
+    (['--k-min', '5', '--k-max', '4'], '--k-min 5 is above --k-max 4'),
+    (['--available', 'nowhere.csv'], 'nowhere.csv'),
+])
+def test_wrong_input_is_told_in_one_line(capsys, arguments, message):
+    assert main(['design', *arguments]) == 2
+    errors = capsys.readouterr().err
+    assert message in errors
+    assert errors.count('\n') == 1

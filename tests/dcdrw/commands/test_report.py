@@ -1,0 +1,111 @@
+"""`dcdrw report`: recordings in, one page and its tables out."""
+
+import csv
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from dcdrw.cli import main
+from dcdrw_msgs_py.rig import RigParams
+from dcdrw_sim.motion.trajectory import run
+from dcdrw_sim.rig.simulator import SimulatorParams
+from tests.bags import joint_state, write_bag
+
+RATE = 100
+SECONDS = 12.0
+
+
+def measured_bag(folder, phase, names=('front_wheel', 'rear_wheel')):
+    """A bag as a rig's own tracker fills it: no coupler, no parameters."""
+    rig, state = SimulatorParams(initial_phase_percent=100.0 * phase).start(RigParams())
+    motion = run(rig, state, SECONDS, 1000)
+    times = np.arange(0.0, SECONDS, 1.0 / RATE)
+    trajectory = motion.at(times)
+    stamps = 10**18 + (times * 1e9).astype(int)
+    return write_bag(folder, [
+        (int(stamp), joint_state(int(stamp), names, (psi1, psi2), (omega1, omega2)))
+        for stamp, psi1, psi2, omega1, omega2 in zip(
+            stamps, trajectory.rotation1, trajectory.rotation2, trajectory.omega1, trajectory.omega2, strict=True)])
+
+
+class Page(HTMLParser):
+    """What a page refers to, and its words."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.links, self.words = [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.links += [value for name, value in attributes if name in ('href', 'src', 'xlink:href')]
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+
+@pytest.fixture(scope='module')
+def report(tmp_path_factory, live_trial):
+    folder = tmp_path_factory.mktemp('report')
+    bag = measured_bag(folder / 'bag', 0.3)
+    path = folder / 'today.html'
+    assert main(['report', str(live_trial), str(bag), '--title', 'A <day>', '--out', str(path)]) == 0
+    return path
+
+
+def rows(report, name):
+    return list(csv.DictReader((report.with_suffix('.csv') / name).read_text().splitlines()))
+
+
+def test_page_is_self_contained_and_tells_each_trial(report):
+    text = report.read_text()
+    page = Page(text)
+    assert all(link.startswith(('#', 'data:')) for link in page.links)
+    assert not re.search(r'url\((?!#)|@import', text)
+    words = ' '.join(page.words)
+    assert 'A <day>' in words
+    assert 'first: "with" new springs' in words  # the operator's note
+    assert text.count('<svg') == 5  # the overlay, and two for each trial
+    assert {'out', 'bag'} <= set(page.words)
+
+
+def test_tables_hold_every_number(report):
+    trials = rows(report, 'trials.csv')
+    assert [(trial['source'], float(trial['initial_phase_percent'])) for trial in trials] == [
+        ('simulated', pytest.approx(35.0)), ('measured', pytest.approx(30.0))]
+    live, bag = trials
+    assert live['synchronized'] == 'True'
+    assert float(live['k']) == 60.0
+    assert live['note'].startswith('first')
+    assert (bag['k'], bag['b'], bag['slope_deg']) == ('', '', ''), 'nobody has told them'
+    # The paper's rig, whose error a step multiplies by 0.9411 (the largest multiplier).
+    assert float(bag['contraction_per_step']) == pytest.approx(0.94, abs=0.02)
+    steps = [step for step in rows(report, 'steps.csv') if step['trial'] == 'bag' and step['wheel'] == 'front']
+    assert len(steps) == int(bag['front_steps'])
+    assert all(step['error_percent'] for step in steps)
+    samples = rows(report, 'samples.csv')
+    assert sum(sample['trial'] == 'bag' for sample in samples) == pytest.approx(SECONDS * RATE, abs=2)
+
+
+def test_nothing_is_overwritten(report, live_trial, capsys):
+    before = report.read_text()
+    assert main(['report', str(live_trial), '--out', str(report)]) == 2
+    assert 'exists already' in capsys.readouterr().err
+    assert report.read_text() == before
+
+
+def test_what_cannot_be_read_is_left_out_and_said(tmp_path, capsys):
+    bag = measured_bag(tmp_path / 'bag', 0.3)
+    (tmp_path / 'empty').mkdir()
+    assert main(['report', str(tmp_path / 'empty'), str(bag), '--out', str(tmp_path / 'r.html')]) == 1
+    assert 'left out' in capsys.readouterr().err
+    assert (tmp_path / 'r.html').exists()
+    assert main(['report', str(tmp_path / 'empty'), '--out', str(tmp_path / 'none.html')]) == 2
+    assert not (tmp_path / 'none.html').exists()
+
+
+def test_trials_of_one_name_are_told_apart(tmp_path):
+    bags = [measured_bag(tmp_path / day / 'bag', 0.3) for day in ('monday', 'tuesday')]
+    assert main(['report', *map(str, bags), '--out', str(tmp_path / 'r.html')]) == 0
+    assert [trial['trial'] for trial in rows(tmp_path / 'r.html', 'trials.csv')] == ['bag', 'bag (2)']

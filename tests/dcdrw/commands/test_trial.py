@@ -1,0 +1,173 @@
+"""`dcdrw trial` as a user runs it: real processes, real DDS."""
+
+import csv
+import json
+import math
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from dcdrw.cli import main
+from tests import ROOT
+
+STIFF = """\
+/**:
+  ros__parameters:
+    k: 60
+    rate: 200
+"""
+
+
+def start(tmp_path: Path, *arguments: str, rig: str = STIFF) -> subprocess.Popen[str]:
+    (tmp_path / 'rig.yaml').write_text(rig)
+    return subprocess.Popen(
+        [sys.executable, '-m', 'dcdrw.cli', 'trial', '--rig', 'rig.yaml', '--out', 'out', *arguments], cwd=tmp_path,
+        env={**os.environ, 'PYTHONPATH': str(ROOT)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def wait_for_motion(process: subprocess.Popen[str]) -> None:
+    """Wait until the trial shows that the wheels roll."""
+    for line in process.stdout:
+        if 'strikes' in line and 'strikes 0 + 0' not in line:
+            return
+    raise AssertionError(process.communicate()[1])
+
+
+def find(process: subprocess.Popen[str], module: str) -> list[int]:
+    """The children of a trial that run a module."""
+    children = Path(f'/proc/{process.pid}/task/{process.pid}/children').read_text().split()
+    return [int(child) for child in children if module in Path(f'/proc/{child}/cmdline').read_text()]
+
+
+def summary(tmp_path: Path) -> dict:
+    return json.loads((tmp_path / 'out' / 'summary.json').read_text())
+
+
+def test_trial_ends_with_summary_picture_and_sentence(tmp_path):
+    process = start(tmp_path, '--initial-phase', '30', '--seconds', '6')
+    output, errors = process.communicate(timeout=60)
+    assert process.returncode == 0, errors
+    result = summary(tmp_path)
+    assert result['end'] == 'complete'
+    assert result['synchronized']
+    assert result['initial_phase_percent'] == pytest.approx(30.0, abs=0.01)
+    assert result['duration_s'] == pytest.approx(6.0, abs=0.05)
+    assert result['samples']['lost'] == 0
+    assert 0 < result['steps_to_synchronization'] < 8
+    # The monitor of the trial and the one that judges its record are one.
+    assert result['diagnostics']['sync_monitor'] == f'synchronized after {result["steps_to_synchronization"]} steps'
+    assert result['parameters']['rig']['k'] == 60.0
+    low, high = result['final_band_percent']
+    assert -7.0 < low < high < 7.0
+    assert f'in {result["steps_to_synchronization"]} steps' in output
+    assert (tmp_path / 'out' / 'trial.png').read_bytes().startswith(b'\x89PNG')
+    rows = list(csv.DictReader((tmp_path / 'out' / 'samples.csv').read_text().splitlines()))
+    assert len(rows) == pytest.approx(1200, abs=5)
+    assert all(abs(float(row['theta1'])) <= math.pi / 12 + 1e-9 for row in rows)
+    for name in ('simulator', 'phase_estimator', 'sync_monitor', 'recorder'):
+        assert 'Traceback' not in (tmp_path / 'out' / f'{name}.log').read_text()
+
+
+def test_interrupt_keeps_what_there_is(tmp_path):
+    process = start(tmp_path, '--seconds', '600')
+    wait_for_motion(process)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=40)
+    assert process.returncode == 130
+    assert 'Traceback' not in errors
+    assert summary(tmp_path)['end'] == 'interrupted'
+    assert (tmp_path / 'out' / 'trial.png').exists()
+    assert (tmp_path / 'out' / 'recording' / 'metadata.yaml').exists()
+
+
+def test_dead_node_ends_the_trial_with_the_reason(tmp_path):
+    process = start(tmp_path, '--seconds', '600')
+    wait_for_motion(process)
+    (node,) = find(process, 'phase_estimator_node')
+    os.kill(node, signal.SIGKILL)
+    _, errors = process.communicate(timeout=40)
+    assert process.returncode == 1
+    assert 'phase_estimator was killed by SIGKILL' in errors
+    assert summary(tmp_path)['end'].startswith('phase_estimator was killed')
+    assert (tmp_path / 'out' / 'samples.csv').stat().st_size > 2000
+
+
+def test_full_disk_ends_the_trial_and_keeps_what_is_there(tmp_path):
+    process = start(tmp_path, '--seconds', '600')
+    wait_for_motion(process)
+    (node,) = find(process, 'recorder_node')
+    size = (tmp_path / 'out' / 'recording' / 'recording_0.mcap').stat().st_size
+    resource.prlimit(node, resource.RLIMIT_FSIZE, (size + 100, size + 100))
+    _, errors = process.communicate(timeout=40)
+    assert process.returncode == 1
+    assert 'dcdrw trial: the recording ended: File too large: out/recording; what came before is kept' in errors
+    assert summary(tmp_path)['end'].startswith('the recording ended: File too large')
+    assert summary(tmp_path)['samples']['joint_states'] > 50
+
+
+def test_silence_ends_the_trial_with_the_reason(tmp_path):
+    process = start(tmp_path, '--seconds', '600')
+    wait_for_motion(process)
+    (node,) = find(process, 'simulator_node')
+    os.kill(node, signal.SIGSTOP)
+    _, errors = process.communicate(timeout=40)
+    assert process.returncode == 1
+    assert 'no data for 3 s' in errors
+    assert summary(tmp_path)['duration_s'] > 0
+
+
+def test_nodes_end_with_a_trial_that_is_killed(tmp_path):
+    process = start(tmp_path, '--seconds', '600')
+    wait_for_motion(process)
+    nodes = find(process, '_node')
+    assert len(nodes) == 4
+    process.kill()
+    process.communicate()
+    end = time.monotonic() + 10
+    while any(Path(f'/proc/{node}').exists() and 'Z' not in Path(f'/proc/{node}/stat').read_text().split()[2]
+              for node in nodes):
+        assert time.monotonic() < end, 'orphans live on'
+        time.sleep(0.05)
+
+
+def test_stalled_rig_is_said_to_stall(tmp_path):
+    (tmp_path / 'out').mkdir()  # empty: may be used
+    process = start(tmp_path, '--seconds', '7', rig=f'{STIFF}    omega1: 0.2\n    omega2: 0.2\n')
+    output, errors = process.communicate(timeout=60)
+    assert process.returncode == 0, errors
+    assert summary(tmp_path)['stalled'] == ['front', 'rear']
+    assert 'stalled after' in output
+
+
+@pytest.mark.parametrize(('arguments', 'message'), [
+    (['--rig', 'nowhere.yaml'], 'nowhere.yaml'),
+    (['--rig', 'broken.yaml'], 'broken.yaml is not YAML'),
+    (['--rig', 'list.yaml'], 'list.yaml is not a parameter file'),
+    (['--rig', 'typo.yaml'], 'sloop is not a parameter (typo.yaml); did you mean slope?'),
+    (['--rig', 'gentle.yaml'], 'is too gentle'),
+    (['--rig', 'stranger.yaml'], 'stranger.yaml has parameters for simulater, which no trial has'),
+    (['--rig', 'clock.yaml'], 'a trial runs in real time: publish_clock must be false'),
+    (['--initial-phase', '120'], 'initial_phase_percent must be'),
+    (['--out', 'full'], 'full exists already, not overwriting'),
+])
+def test_wrong_input_is_told_in_one_line(tmp_path, monkeypatch, capsys, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    Path('broken.yaml').write_text('a: [')
+    Path('list.yaml').write_text('- 1')
+    Path('typo.yaml').write_text('/**:\n  ros__parameters:\n    sloop: 0.03\n')
+    Path('gentle.yaml').write_text('/**:\n  ros__parameters:\n    slope: 0.001\n')
+    Path('stranger.yaml').write_text('simulater:\n  ros__parameters:\n    k: 3\n')
+    Path('clock.yaml').write_text('/**:\n  ros__parameters:\n    publish_clock: true\n')
+    Path('full').mkdir()
+    Path('full/summary.json').write_text('{}')
+    assert main(['trial', *arguments]) == 2
+    errors = capsys.readouterr().err
+    assert message in errors
+    assert errors.count('\n') == 1
+    assert not Path('trials').exists()

@@ -1,0 +1,259 @@
+"""The live page in Chromium, against real nodes."""
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rcl_interfaces.srv import GetParameters
+from rclpy.parameter import parameter_value_to_python
+
+from dcdrw.page.live_state import NO_DATA, SYNCHRONIZED
+from dcdrw_msgs_py.messages import stamp_ns
+from dcdrw_msgs_py.topics import JOINT_STATES, PHASE_STATE
+from dcdrw_msgs_py.topics import SYNCHRONIZED as VERDICT
+from tests import ROOT
+from tests.bench import PATIENCE, Bench
+from tests.chromium import Chromium, Tab
+
+STIFF = {'k': 60.0, 'rate': 100.0, 'initial_phase_percent': 30.0}
+STATE = 'document.body.dataset.state'
+RIG = "JSON.stringify(document.getElementById('rig-canvas').dataset)"
+RIGHT_ARROW, HOME = ('ArrowRight', 39), ('Home', 36)
+
+
+@pytest.fixture(scope='module')
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
+    browser = Chromium(tmp_path_factory.mktemp('chromium'))
+    yield browser
+    browser.close()
+
+
+@pytest.fixture
+def live(bench: Bench) -> Iterator['Live']:
+    live = Live({'ROS_DOMAIN_ID': str(bench.domain)})
+    yield live
+    live.close()
+
+
+class Live:
+    """`dcdrw live` as a process; it starts again at the same port."""
+
+    def __init__(self, environment: dict[str, str]) -> None:
+        self._environment = {**os.environ, 'PYTHONPATH': str(ROOT), **environment}
+        self._processes: list[subprocess.Popen[str]] = []
+        self._port = '0'
+
+    def start(self, *arguments: str) -> str:
+        """Start, and return the address."""
+        process = subprocess.Popen(
+            [sys.executable, '-m', 'dcdrw.cli', 'live', '--port', self._port, *arguments], env=self._environment,
+            stdout=subprocess.PIPE, text=True)
+        self._processes.append(process)
+        assert process.stdout
+        told = next(line for line in process.stdout if line.startswith('Live at'))
+        address = told.split()[2]
+        self._port = address.split(':')[2].split('/')[0]
+        return address
+
+    def end(self, number: int = signal.SIGINT) -> int:
+        self._processes[-1].send_signal(number)
+        return self._processes[-1].wait(PATIENCE)
+
+    def close(self) -> None:
+        for process in self._processes:
+            if process.poll() is None:
+                process.kill()
+            process.wait()
+            assert process.stdout
+            process.stdout.close()
+
+
+def start_nodes(bench: Bench, **parameters: Any) -> None:
+    bench.start('sync_monitor')
+    bench.start('phase_estimator')
+    bench.start('simulator', **{**STIFF, **parameters})
+
+
+def text(tab: Tab, name: str) -> str:
+    return str(tab.value(f"document.getElementById('{name}').textContent"))
+
+
+def drawn(tab: Tab) -> dict[str, Any]:
+    return dict(json.loads(tab.value(RIG)))
+
+
+def at(stamp: str, messages: list[Any]) -> Any:
+    return next((message for message in messages if str(stamp_ns(message.header.stamp)) == stamp), None)
+
+
+def parameter(bench: Bench, name: str) -> Any:
+    answer = bench.call(GetParameters, '/simulator/get_parameters', GetParameters.Request(names=[name]))
+    return parameter_value_to_python(answer.values[0])
+
+
+def test_what_is_drawn_follows_the_data(bench, live, chromium):
+    phases, joints, verdicts = bench.hear(PHASE_STATE), bench.hear(JOINT_STATES), bench.hear(VERDICT)
+    start_nodes(bench)
+    token = 'known-to-this-browser'
+    address = live.start('--token', token)
+    tab = chromium.tab(address)
+    assert tab.value('location.search') == '', 'the token is no longer in the address'
+    # The topics are found one after the other; without the coupler's length the feet are the footfalls' guess.
+    tab.wait("document.getElementById('force-canvas').dataset.points > 10")
+    seen, unheard = 0, 0
+    while seen < 15:  # what is drawn is what the topics said at its stamp
+        now = bench.wait(lambda: drawn(tab).get('stampNs') and drawn(tab), 'a drawing')
+        try:
+            phase, joint = (bench.wait(partial(at, now['stampNs'], heard), 'what was drawn', 2.0)
+                            for heard in (phases, joints))
+        except AssertionError:  # a sample that this listener lost, or has come too late for
+            unheard += 1
+            assert unheard < 10
+            continue
+        seen += 1
+        angles = dict(zip(phase.name, phase.position, strict=True))
+        assert float(now['theta1']) == pytest.approx(angles['front_stance'], abs=1e-4)
+        assert float(now['theta2']) == pytest.approx(angles['rear_stance'], abs=1e-4)
+        assert int(now['n']) == angles['step_difference']
+        assert float(now['hubs']) == pytest.approx(joint.position[list(joint.name).index('coupler')], abs=1e-3)
+    tab.wait(f'{STATE} === "{SYNCHRONIZED}"')
+    bench.wait(lambda: verdicts and verdicts[-1].data, 'the verdict')
+    tab.wait("document.getElementById('detail').textContent.startsWith('synchronized after')")
+    tab.wait("document.getElementById('errors-canvas').dataset.shown >= 5")
+    tab.wait("document.getElementById('gait-canvas').dataset.falls >= 10")
+    for canvas in ('phi', 'force'):
+        tab.wait(f"document.getElementById('{canvas}-canvas').dataset.points > 100")
+    assert abs(float(text(tab, 'error').replace('−', '-').removesuffix(' %'))) < 10.0
+    tab.wait("document.querySelectorAll('#nodes .name').length === 3")
+    tab.open(address.split('?')[0])  # the cookie is enough
+    tab.wait(f'{STATE} === "{SYNCHRONIZED}"')
+    tab.wait("document.getElementById('phi-canvas').dataset.points > 100")
+    assert tab.complaints == []
+    assert live.end() == 0
+
+
+def test_sliders_and_buttons_act_through_the_nodes(bench, live, chromium, tmp_path):
+    joints = bench.hear(JOINT_STATES)
+    start_nodes(bench, k=5.25)
+    tab = chromium.tab(live.start())
+    tab.wait("document.getElementById('k-range')?.disabled === false")
+    assert tab.value("document.getElementById('k-field').valueAsNumber") == 5.25
+    assert tab.value("document.getElementById('record').disabled")
+    assert 'No recorder runs here' in text(tab, 'hint')
+
+    tab.value("document.getElementById('k-range').focus()")
+    tab.press(*HOME)
+    for _ in range(3):
+        tab.press(*RIGHT_ARROW)
+    asked = tab.value("document.getElementById('k-range').valueAsNumber")
+    assert asked > 0.0
+    bench.wait(lambda: parameter(bench, 'k') == pytest.approx(asked), 'the slider in the simulator')
+    enter(tab, 'slope', 3.0)
+    bench.wait(lambda: parameter(bench, 'slope') == pytest.approx(math.radians(3.0)), 'the slope in the simulator')
+    tab.wait("document.getElementById('slope').textContent === 'on a slope of 3.00°'")
+    enter(tab, 'b', 900.0)  # beyond the slider, which widens
+    bench.wait(lambda: parameter(bench, 'b') == 900.0, 'b in the simulator')
+    assert tab.value("document.getElementById('b-range').valueAsNumber") == 900.0
+    enter(tab, 'k', -5.0)  # impossible: the field itself says so
+    assert tab.value("document.getElementById('k-field').validity.rangeUnderflow")
+    assert parameter(bench, 'k') == pytest.approx(asked)
+
+    click(tab, 'pause')
+    bench.wait(lambda: joints[-1].velocity[0] == 0.0, 'a pause')
+    tab.wait("document.getElementById('pause').textContent === 'Go on'")
+    tab.wait("document.getElementById('detail').textContent === 'paused: the wheels are held'")
+    click(tab, 'pause')
+    bench.wait(lambda: joints[-1].velocity[0] > 0.0, 'the end of the pause')
+    turned = joints[-1].position[0]
+    click(tab, 'reset')
+    bench.wait(lambda: joints[-1].position[0] < turned, 'the reset')
+    tab.wait("document.getElementById('notice').textContent === 'the wheels are back at their start'")
+
+    bench.start('recorder', folder=tmp_path / 'recording')
+    tab.wait("document.getElementById('record').disabled === false")
+    click(tab, 'record')
+    tab.wait("document.getElementById('record').getAttribute('aria-pressed') === 'true'")
+    click(tab, 'record')
+    tab.wait("document.getElementById('record').getAttribute('aria-pressed') === 'false'")
+    assert (tmp_path / 'recording' / 'metadata.yaml').exists()
+    assert tab.complaints == []
+
+
+def click(tab: Tab, name: str) -> None:
+    tab.value(f"document.getElementById('{name}').click()")
+
+
+def enter(tab: Tab, name: str, value: float) -> None:
+    tab.value(f"(() => {{ const field = document.getElementById('{name}-field'); field.value = {value}; "
+              "field.dispatchEvent(new Event('change')); })()")
+
+
+def test_page_outlives_nodes_servers_and_sleep(bench, live, chromium):
+    bench.start('sync_monitor')
+    bench.start('phase_estimator')
+    simulator = bench.start('simulator', **STIFF)
+    address = live.start()
+    tab, phone = chromium.tab(address), chromium.tab(address, 390, 844, dark=True)
+    for one in (tab, phone):
+        one.wait(f'{STATE} !== "{NO_DATA}"')
+    assert phone.value('document.documentElement.scrollWidth') == 390, 'nothing is cut off'
+
+    phone.send('Page.setWebLifecycleState', state='frozen')
+    bench.end(simulator, signal.SIGKILL)
+    tab.wait(f'{STATE} === "{NO_DATA}"')
+    assert 'nothing has come for' in text(tab, 'detail')
+    bench.start('simulator', **STIFF)
+    tab.wait(f'{STATE} !== "{NO_DATA}"')
+    phone.send('Page.setWebLifecycleState', state='active')
+    phone.wait(f'{STATE} !== "{NO_DATA}"')
+    for one in (tab, phone):  # only what is seen is drawn, and Chromium forgets who that is while one is frozen
+        one.send('Page.bringToFront')
+    before = int(drawn(phone)['stampNs'])
+    phone.wait(RIG, lambda rig: int(json.loads(rig)['stampNs']) > before)
+    assert tab.complaints == phone.complaints == []
+
+    live.end(signal.SIGKILL)
+    tab.wait(f'{STATE} === "{NO_DATA}"')
+    assert 'no connection' in text(tab, 'detail')
+    assert tab.value("document.getElementById('reset').disabled")
+    live.start()
+    for one in (tab, phone):
+        one.wait(f'{STATE} !== "{NO_DATA}"')
+        # That its server was away is all that the browser itself has to say.
+        assert all('WebSocket connection' in complaint for complaint in one.complaints)
+
+
+def test_trial_starts_the_nodes_and_lets_the_wheels_go(chromium):
+    live = Live({})
+    try:
+        tab = chromium.tab(live.start('--trial'))
+        tab.wait("Number(document.getElementById('errors-canvas').dataset.steps) > 0")
+        tab.wait("document.querySelectorAll('#nodes .name').length === 4")
+        assert tab.complaints == []
+        nodes = [pid for pid in children(live._processes[-1].pid) if '_node' in command(pid)]
+        assert len(nodes) == 4
+        assert live.end() == 0
+        assert not [pid for pid in nodes if command(pid)]
+    finally:
+        live.close()
+
+
+def children(pid: int) -> list[int]:
+    found = [Path(f'/proc/{pid}/task/{task}/children').read_text() for task in os.listdir(f'/proc/{pid}/task')]
+    return [int(child) for child in ' '.join(found).split()]
+
+
+def command(pid: int) -> str:
+    """The command line of a process; empty where it has ended."""
+    try:
+        return Path(f'/proc/{pid}/cmdline').read_text()
+    except FileNotFoundError:
+        return ''

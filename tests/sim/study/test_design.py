@@ -1,0 +1,100 @@
+"""Choosing the coupler."""
+
+import math
+
+import numpy as np
+import pytest
+
+from dcdrw_msgs_py.rig import RigParams, WheelParams
+from dcdrw_sim.model.scaling import nondimensional
+from dcdrw_sim.motion.ensemble import spread
+from dcdrw_sim.study.design import Task, assess, forgiving_order, mesh, score, search
+from dcdrw_sim.study.points import judge_points
+from dcdrw_sim.study.sweep import default_seconds
+from dcdrw_sim.study.verdict import Verdict
+
+RIG = RigParams()
+BAND = 0.06 * 2 * RIG.rear.alpha
+TASK = Task(RIG, default_seconds(RIG), BAND)
+QUICK = Task(RIG, default_seconds(RIG) / 10, BAND, (0.2, 0.7))
+RANGES = (1.0, 100.0), (1.0, 100.0)
+
+
+def test_score_is_the_judgement_of_each_point():
+    k, b = np.array([5.25, 12.0, 30.0]), np.array([100.0, 8.0, 1.0])
+    scores = score(TASK, k, b)
+    for index in range(3):
+        found = judge_points(spread(RIG._replace(k=k[index], b=b[index]), 1, {}), TASK.seconds, band=BAND)
+        assert scores.verdict[index] == found['verdict'][0]
+        assert scores.steps[index] == found['steps'][0]
+        assert scores.mean_steps[index] == found['start_steps'].mean()
+
+
+def test_score_does_not_depend_on_units():
+    reduced, scales = nondimensional(RIG)
+    k, b = mesh((1.0, 50.0), (2.0, 200.0))
+    some = slice(0, None, 50)
+    here = score(TASK, k[some], b[some])
+    there = score(Task(reduced, TASK.seconds / scales.time, BAND), k[some] / scales.stiffness, b[some] / scales.damping)
+    np.testing.assert_array_equal(here.verdict, there.verdict)
+    np.testing.assert_array_equal(here.steps, there.steps)
+
+
+def test_order_goes_from_settling_fast_to_not_settling():
+    scores = score(TASK, np.array([5.25, 12.0, 0.01]), np.array([100.0, 8.0, 1000.0]))
+    assert scores.order().tolist() == [1, 0, 2]
+    assert math.isnan(scores.steps[2])
+
+
+def test_wheels_that_do_not_roll_stall():
+    scores = score(TASK, np.full(2, 12.0), np.full(2, 8.0), np.radians([1.0, 2.0]))  # they roll from 1.083° on
+    assert [Verdict(verdict) for verdict in scores.verdict] == [Verdict.STALLS, Verdict.SETTLES]
+
+
+def test_search_finds_no_worse_than_its_first_look_within_the_bounds():
+    progress = []
+    found = search(QUICK, *RANGES, report=progress.append)
+    fastest = score(QUICK, *(np.array([value]) for value in found.fastest))
+    assert fastest.steps[0] <= np.nanmin(found.grid.steps)
+    for pair in (found.fastest, found.forgiving):
+        assert all(low <= value <= high for value, (low, high) in zip(pair, RANGES, strict=True))
+    pairs = np.array([found.fastest, found.forgiving]).T
+    assert forgiving_order(QUICK, *pairs, 0.3)[0] == 1 or found.fastest == found.forgiving
+
+
+def test_what_is_fastest_but_stalls_on_a_slope_a_little_gentler_is_not_forgiving():
+    k, b = np.array([41.12, 12.0]), np.array([14.71, 8.0])
+    assert score(TASK, k, b).order()[0] == 0
+    assert forgiving_order(TASK, k, b, 0.0)[0] == 1
+
+
+def test_margins_are_where_settling_ends():
+    found = assess(TASK, 22.0, 8.0)
+    slope = found.margins['slope']
+    assert 0.8 < slope.low < 0.9
+    inside, outside = (score(TASK, np.array([22.0]), np.array([8.0]), np.array([factor * slope.low * RIG.slope]))
+                       for factor in (1.0 + 1e-9, 0.995))
+    assert inside.verdict[0] == Verdict.SETTLES
+    assert outside.verdict[0] > Verdict.SETTLES
+    stiff = found.margins['k']
+    assert score(TASK, np.array([22.0 * stiff.high]), np.array([8.0])).verdict[0] == Verdict.SETTLES
+    assert score(TASK, np.array([22.0 * stiff.high * 1.005]), np.array([8.0])).verdict[0] > Verdict.SETTLES
+
+
+def test_masses_only_scale_the_coupler():
+    found = assess(TASK, 22.0, 8.0)
+    heavier = next(one for one in found.sensitivity if one.parameter == 'mass' and one.factor > 1.0)
+    lighter = score(TASK, np.array([22.0 / 1.3]), np.array([8.0 / 1.3]))
+    assert heavier.steps == lighter.steps[0]
+
+
+@pytest.mark.parametrize('wheel', [WheelParams(spokes=6), WheelParams(spokes=8)])
+def test_a_rig_that_does_not_roll_is_refused(wheel):
+    with pytest.raises(ValueError, match='too gentle'):
+        search(Task(RigParams(wheel, wheel), 10.0, BAND), *RANGES)
+
+
+@pytest.mark.parametrize('bounds', [((2.0, 1.0), (1.0, 2.0)), ((0.0, 1.0), (1.0, 2.0))])
+def test_impossible_bounds_are_refused(bounds):
+    with pytest.raises(ValueError, match='bounds'):
+        search(TASK, *bounds)

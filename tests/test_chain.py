@@ -1,0 +1,103 @@
+"""The whole chain in three processes."""
+
+import signal
+from itertools import pairwise
+
+from std_srvs.srv import SetBool
+
+from dcdrw_msgs_py.messages import PhaseSampleReader
+from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, PHASE_STATE, SYNC_ERROR_PERCENT, SYNCHRONIZED
+from dcdrw_sim.motion.trajectory import run
+from dcdrw_sim.rig.simulator import SimulatorParams
+from tests.bench import Bench
+
+# With a stiffer spring than the paper's the pair is in step within seconds.
+STIFF = {'k': 60.0, 'initial_phase_percent': 35.0, 'rate': 200.0}
+
+
+def start_chain(bench: Bench):
+    for name in ('sync_monitor', 'phase_estimator'):
+        bench.start(name)
+    return bench.start('simulator', paused=True, **STIFF)
+
+
+def monitor_says(diagnostics) -> tuple[int, str]:
+    said = [m.status[0] for m in diagnostics if m.status[0].name == 'sync_monitor']
+    return (said[-1].level[0], said[-1].message) if said else (-1, '')
+
+
+def let_go(bench: Bench) -> None:
+    assert bench.call(SetBool, '/simulator/pause', SetBool.Request(data=False)).success
+
+
+def test_estimate_is_the_truth_of_the_simulation(bench):
+    phases, falls, errors = bench.hear(PHASE_STATE), bench.hear(FOOTFALLS), bench.hear(SYNC_ERROR_PERCENT)
+    start_chain(bench)
+    bench.wait(lambda: errors and phases and bench.node.count_publishers(FOOTFALLS.name), 'the whole chain')
+    let_go(bench)
+    bench.wait(lambda: len(falls) >= 16, 'sixteen strikes')
+    settings = SimulatorParams(initial_phase_percent=STIFF['initial_phase_percent'])
+    start_rig, start_state = settings.start(RigParams(k=STIFF['k']))
+    model = run(start_rig, start_state, strikes=16)
+    read = PhaseSampleReader()
+    moving = [sample for sample in map(read.read, phases) if sample.front.rate]
+    start = moving[0].stamp_ns
+    # The footfalls are the strikes of the model: in order, interpolated between samples 5 ms apart.
+    assert [1 if fall.header.frame_id == 'front' else 2 for fall in falls[:16]] == [s.wheel for s in model.strikes]
+    for fall, strike in zip(falls, model.strikes, strict=False):
+        t = (fall.header.stamp.sec * 10**9 + fall.header.stamp.nanosec - start) / 1e9
+        assert abs(t - strike.t) < 2e-4
+        first_foot = start_rig.S0 if strike.wheel == 1 else 0.0
+        assert abs(fall.point.x - first_foot - fall.point.z * RigParams().front.step_length) < 1e-9
+    for sample in moving[:400]:
+        t = (sample.stamp_ns - start) / 1e9
+        if t > model.duration:
+            break
+        truth = model.at([t])
+        phase = (truth.rotation1[0] - truth.rotation2[0]) / (2 * RigParams().front.alpha) % 1.0
+        assert abs(sample.phi.angle / (2 * RigParams().front.alpha) - phase) < 1e-8
+        assert sample.step_difference == truth.steps1[0] - truth.steps2[0] or min(
+            abs(t - s.t) for s in model.strikes) < 1e-6
+
+
+def test_killed_simulator_is_stale_and_a_new_one_is_judged_afresh(bench):
+    verdicts, diagnostics = bench.hear(SYNCHRONIZED), bench.hear(DIAGNOSTICS)
+    errors = bench.hear(SYNC_ERROR_PERCENT)
+    simulator = start_chain(bench)
+    bench.wait(lambda: errors, 'an error at the end of the chain')
+    let_go(bench)
+    bench.wait(lambda: verdicts and verdicts[-1].data, 'synchronized')
+    bench.wait(lambda: monitor_says(diagnostics)[1].startswith('synchronized after'), 'a diagnosis that says so')
+
+    simulator.send_signal(signal.SIGKILL)
+    simulator.wait(10)
+    bench.wait(lambda: not verdicts[-1].data, 'the end of the verdict')
+    bench.wait(lambda: monitor_says(diagnostics)[0] == 3, 'STALE')
+
+    count = len(errors)
+    bench.start('simulator', k=60.0, initial_phase_percent=20.0, rate=200.0)
+    bench.wait(lambda: len(errors) > count + 100, 'errors of the new run')
+    bench.wait(lambda: monitor_says(diagnostics)[0] == 0, 'a monitor that has recovered')
+    claimed = []
+
+    def again():
+        if verdicts[-1].data:
+            claimed.append(errors[-1].data)
+        return claimed
+
+    bench.wait(again, 'synchronized again')
+    assert abs(claimed[0]) < 8.0  # never claimed while the error, which starts at −30 %, is outside the band
+
+
+def test_chain_follows_simulated_time_at_another_pace(bench):
+    phases, verdicts = bench.hear(PHASE_STATE), bench.hear(SYNCHRONIZED)
+    for name in ('sync_monitor', 'phase_estimator'):
+        bench.start(name, use_sim_time=True)
+    bench.wait(lambda: bench.node.count_subscribers('phase_state') >= 2, 'the monitor')
+    bench.start('simulator', publish_clock=True, real_time_factor=4, **STIFF)
+    bench.wait(lambda: verdicts and verdicts[-1].data, 'synchronized')
+    read = PhaseSampleReader()
+    stamps = [read.read(phase).stamp_ns for phase in phases]
+    assert stamps[-1] < 10**12  # simulated time, which began at 0 with the simulator
+    assert {b - a for a, b in pairwise(stamps)} == {5_000_000}
