@@ -31,8 +31,8 @@ test: $(READY)
 ifdef ARGS
 	@$(BIN)/python -m pytest $(ARGS)
 else
-	@$(BIN)/python -m pytest --numprocesses 2 --dist worksteal --ignore tests/cli --ignore tests/ros tests
-	@$(BIN)/python -m pytest --reruns 1 tests/cli tests/ros
+	@$(BIN)/python -m pytest --numprocesses 2 --dist worksteal -m 'not processes'
+	@$(BIN)/python -m pytest --reruns 1 -m processes
 endif
 
 lint: $(READY)

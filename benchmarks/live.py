@@ -76,9 +76,13 @@ async def measure(command: list[str], browsers: int, seconds: float) -> Result:
             used, resident, start = cpu_seconds(process.pid), memory(process.pid), time.monotonic()
             await asyncio.sleep(seconds)
             elapsed = time.monotonic() - start
-            result = Result(100.0 * (cpu_seconds(process.pid) - used) / elapsed, memory(process.pid),
-                            memory(process.pid) - resident, frames / elapsed / max(browsers, 1),
-                            volume / elapsed / 1000.0 / max(browsers, 1))
+            result = Result(
+                100.0 * (cpu_seconds(process.pid) - used) / elapsed,
+                memory(process.pid),
+                memory(process.pid) - resident,
+                frames / elapsed / max(browsers, 1),
+                volume / elapsed / 1000.0 / max(browsers, 1),
+            )
             for task in watching:
                 task.cancel()
             await asyncio.gather(*watching, return_exceptions=True)
@@ -111,9 +115,12 @@ def main() -> int:
     with free_domain() as domain:
         os.environ.update(ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST')
         rclpy.init()  # so that the domain is taken
-        nodes: list[Any] = [subprocess.Popen(
-            [sys.executable, '-m', node.module, '--ros-args', '--log-level', 'warn', '-p', f'rate:={options.rate}'])
-            for node in reversed(TRIAL)]
+        nodes: list[Any] = [
+            subprocess.Popen(
+                [sys.executable, '-m', node.module, '--ros-args', '--log-level', 'warn', '-p', f'rate:={options.rate}']
+            )
+            for node in reversed(TRIAL)
+        ]
         try:
             compare(options.browsers, options.seconds)
         finally:

@@ -65,8 +65,9 @@ class BareNode(Node):
         late = self.get_clock().now().nanoseconds - self._due_ns
         due = self._due_ns + late // self._period_ns * self._period_ns
         self._due_ns = due + self._period_ns
-        self._joints.publish(self._writer.write(
-            JointSample(due, Turn(due / SECOND, 0.0), Turn(0.0, 0.0), CouplerSample(0.0, 0.0, 0.0))))
+        self._joints.publish(
+            self._writer.write(JointSample(due, Turn(due / SECOND, 0.0), Turn(0.0, 0.0), CouplerSample(0.0, 0.0, 0.0)))
+        )
 
     def _estimate(self, message: JointState) -> None:
         self._message.header.stamp = message.header.stamp
@@ -125,8 +126,14 @@ def measure(commands: list[list[str]], errors_of: Callable[[list[Any]], list[flo
     return match(joints, errors_of(joints), errors, used[::-1], start_ns, end_ns)
 
 
-def match(joints: list[JointState], expected: list[float], errors: list[tuple[float, int]], cpu: list[float],
-          start_ns: int, end_ns: int) -> Result:
+def match(
+    joints: list[JointState],
+    expected: list[float],
+    errors: list[tuple[float, int]],
+    cpu: list[float],
+    start_ns: int,
+    end_ns: int,
+) -> Result:
     """Pair each joint state of the measured time with the error that it led to."""
     latencies, sent, lost = [], 0, 0
     # The ends of the chain were not found at the same instant: begin with the first pair that was heard of both.

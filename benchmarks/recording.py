@@ -39,8 +39,9 @@ RATE = 1000
 def write(folder: Path, seconds: float) -> int:
     """Record a pair's motion at 1 kHz; return the number of messages."""
     types = get_typestore(Stores.ROS2_JAZZY)
-    time_type, header, joint_state = (types.types[name] for name in (
-        'builtin_interfaces/msg/Time', 'std_msgs/msg/Header', JOINT_STATE))
+    time_type, header, joint_state = (
+        types.types[name] for name in ('builtin_interfaces/msg/Time', 'std_msgs/msg/Header', JOINT_STATE)
+    )
     rig, start = SimulatorParams().start(RigParams())
     model = run(rig, start, strikes=int(4 * seconds) + 4)
     motion = model.at(np.arange(int(min(seconds, model.duration) * RATE)) / RATE)
@@ -51,8 +52,11 @@ def write(folder: Path, seconds: float) -> int:
     for k, (length, rate, force) in enumerate(coupler):
         message = joint_state(
             header(time_type(1_700_000_000 + k // RATE, k % RATE * 1_000_000), ''),
-            ['front_wheel', 'rear_wheel', 'coupler'], np.array([*place[k], length]), np.array([*speed[k], rate]),
-            np.array([np.nan, np.nan, force]))
+            ['front_wheel', 'rear_wheel', 'coupler'],
+            np.array([*place[k], length]),
+            np.array([*speed[k], rate]),
+            np.array([np.nan, np.nan, force]),
+        )
         recorder.write('/joint_states', bytes(types.serialize_cdr(message, JOINT_STATE)))
         if k % (RATE // 2) == 0:
             recorder.flush()
@@ -103,8 +107,18 @@ def compare_nodes(rounds: int, seconds: float, rate: float) -> None:
         alone.append(measure(suite, suite_errors, seconds))
         with tempfile.TemporaryDirectory() as temporary:
             folder = Path(temporary) / 'bag'
-            recorder = [sys.executable, '-m', 'dcdrw.nodes.recorder_node', '--ros-args', '--log-level', 'warn',
-                        '-p', f'folder:={folder}', '-p', 'record:=true']
+            recorder = [
+                sys.executable,
+                '-m',
+                'dcdrw.nodes.recorder_node',
+                '--ros-args',
+                '--log-level',
+                'warn',
+                '-p',
+                f'folder:={folder}',
+                '-p',
+                'record:=true',
+            ]
             beside.append(measure([recorder, *suite], suite_errors, seconds))
             with Recording(folder) as recording:
                 stamps = np.concatenate([batch.stamp_ns for batch in recording.joints('/joint_states')])

@@ -58,8 +58,10 @@ def main() -> None:
 
             frames = (JointSample(0, Turn(k / 60, 1.0), Turn(k / 60 + 0.25, 1.0)) for k in range(count + WARM_UP))
             taken = milliseconds(lambda: renderer.draw(footing, next(frames)), count)  # noqa: B023 - called at once
-            print(f'{encoding}, {name:33}{taken:8.2f}{1e3 / taken:8.0f}{taken / copy:10.1f}{taken / warp:10.1f}',
-                  flush=True)
+            print(
+                f'{encoding}, {name:33}{taken:8.2f}{1e3 / taken:8.0f}{taken / copy:10.1f}{taken / warp:10.1f}',
+                flush=True,
+            )
 
 
 if __name__ == '__main__':

@@ -55,13 +55,23 @@ def bare_kernel() -> Callable[[int], None]:
     jobs = []
     for part in np.array_split(np.arange(COUNT), CORES):
         counts = (np.zeros(len(part), np.int64), np.zeros(len(part), np.int64), np.zeros(len(part)))
-        jobs.append((ensemble._aligned(ensemble.SIZE), ensemble._parameters(ensemble.take(pairs, part)), starts[part],
-                     SWEEP.seconds, ensemble.TOLERANCE, np.zeros((len(part), capacity), ensemble.STRIKE), *counts))
+        jobs.append(
+            (
+                ensemble._aligned(ensemble.SIZE),
+                ensemble._parameters(ensemble.take(pairs, part)),
+                starts[part],
+                SWEEP.seconds,
+                ensemble.TOLERANCE,
+                np.zeros((len(part), capacity), ensemble.STRIKE),
+                *counts,
+            )
+        )
 
     def program(cores: int) -> None:
         for job in jobs:
             job[6][:] = 0
         on_threads(cores, lambda job: ensemble._run(*job), jobs)
+
     return program
 
 
@@ -94,6 +104,7 @@ def rolling_with_scipy(count: int) -> Callable[[], None]:
         for start, pair in zip(starts, which, strict=True):
             found = trajectories.scipy_strikes(start.tolist(), float(pairs.k[pair]), float(pairs.b[pair]))
             assert abs(len(found) + 1 - motions.counts[pair]) <= 1, 'SciPy sees other strikes'
+
     return program
 
 
@@ -106,14 +117,17 @@ def timed(program: Callable[[], None]) -> tuple[float, float]:
 
 def memory(shape: tuple[int, int]) -> float:
     """Peak of a process that computes a sweep of this shape [MB]."""
-    done = subprocess.run([sys.executable, __file__, '--memory', *map(str, shape)], check=True, capture_output=True,
-                          text=True)
+    done = subprocess.run(
+        [sys.executable, __file__, '--memory', *map(str, shape)], check=True, capture_output=True, text=True
+    )
     return float(done.stdout)
 
 
 def print_own_memory(shape: tuple[int, int]) -> None:
-    x, y = (Axis(axis.name, tuple(np.geomspace(axis.values[0], axis.values[-1], count).tolist()))
-            for axis, count in zip((SWEEP.x, SWEEP.y), shape, strict=True))
+    x, y = (
+        Axis(axis.name, tuple(np.geomspace(axis.values[0], axis.values[-1], count).tolist()))
+        for axis, count in zip((SWEEP.x, SWEEP.y), shape, strict=True)
+    )
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(CORES) as pool:
         run_sweep(SWEEP._replace(x=x, y=y, seconds=50.0), Path(folder) / 'sweep.nc', pool, CORES + 1)
     status = dict(line.split(':', 1) for line in Path('/proc/self/status').read_text().splitlines())
@@ -142,11 +156,17 @@ def main() -> None:
     print(f'{COUNT} trajectories{"":12}{"s":>8}{"of bare":>9}{"× SciPy":>9}{"CPU s":>9}{"of bare":>9}{"× SciPy":>9}')
     one = tuple(taken * COUNT / options.scipy for taken in scipy)
     for (name, cores), taken in best.items():
-        ratios = [(bare / mine, reference / mine / spread) for bare, mine, reference, spread in zip(
-            best['bare kernel', cores], taken, one, (cores, 1), strict=True)]
-        print(f'{name + f", {cores} core" + "s" * (cores > 1):30}' + ''.join(
-            f'{mine:{width}.2f}{100 * part:8.0f}%{times:9.0f}'
-            for mine, (part, times), width in zip(taken, ratios, (8, 9), strict=True)))
+        ratios = [
+            (bare / mine, reference / mine / spread)
+            for bare, mine, reference, spread in zip(best['bare kernel', cores], taken, one, (cores, 1), strict=True)
+        ]
+        print(
+            f'{name + f", {cores} core" + "s" * (cores > 1):30}'
+            + ''.join(
+                f'{mine:{width}.2f}{100 * part:8.0f}%{times:9.0f}'
+                for mine, (part, times), width in zip(taken, ratios, (8, 9), strict=True)
+            )
+        )
     print(f'{"SciPy DOP853, 1 core":30}{one[0]:8.0f}{"":18}{one[1]:9.0f}')
     small, large = map(memory, SIZES)
     print(f'\npeak memory: {small:.0f} MB for {math.prod(SIZES[0])} points, {large:.0f} MB for {math.prod(SIZES[1])}')

@@ -70,12 +70,19 @@ class Case(NamedTuple):
 CASES = (
     Case('120 px', 120.0, 0.1),
     Case('40 px', 40.0, 0.3),
-    Case('40 px, 30 s, 20 % lost, one hidden 0.5 s', 40.0, 0.3, lost=0.2, seconds=30.0, look=LookParams(
-        exposure=0.001, occlude=REAR, occlude_from=12.0, occlude_for=0.5)),
+    Case(
+        '40 px, 30 s, 20 % lost, one hidden 0.5 s',
+        40.0,
+        0.3,
+        lost=0.2,
+        seconds=30.0,
+        look=LookParams(exposure=0.001, occlude=REAR, occlude_from=12.0, occlude_for=0.5),
+    ),
     Case('120 px, 30° oblique', 120.0, 0.5, ViewParams(pan_deg=30.0)),
     Case('120 px, 2 px blur', 120.0, 0.5, look=LookParams(exposure=0.001, blur_px=2.0)),
-    Case('120 px, 30° oblique, 2 px blur', 120.0, 0.5, ViewParams(pan_deg=30.0),
-         LookParams(exposure=0.001, blur_px=2.0)),
+    Case(
+        '120 px, 30° oblique, 2 px blur', 120.0, 0.5, ViewParams(pan_deg=30.0), LookParams(exposure=0.001, blur_px=2.0)
+    ),
     Case('40 px, 30° oblique', 40.0, 0.5, ViewParams(pan_deg=30.0)),
     Case('40 px, 2 px blur', 40.0, 0.5, look=LookParams(exposure=0.001, blur_px=2.0)),
     Case('40 px, 30° oblique, 2 px blur', 40.0, 0.5, ViewParams(pan_deg=30.0), LookParams(exposure=0.001, blur_px=2.0)),
@@ -85,8 +92,11 @@ CASES = (
     Case('60 px, noise of 10', 60.0, look=LookParams(exposure=0.001, noise=10.0)),
     Case('60 px, dark', 60.0, look=LookParams(exposure=0.001, brightness=0.2)),
     Case('60 px, exposure of 8 ms', 60.0, look=LookParams(exposure=0.008)),
-    Case('60 px, one hidden half the time', 60.0,
-         look=LookParams(exposure=0.001, occlude=FRONT, occlude_from=1.0, occlude_for=0.5, occlude_every=1.0)),
+    Case(
+        '60 px, one hidden half the time',
+        60.0,
+        look=LookParams(exposure=0.001, occlude=FRONT, occlude_from=1.0, occlude_for=0.5, occlude_every=1.0),
+    ),
 )
 
 
@@ -146,8 +156,9 @@ class Score:
         self._times.append(time.process_time() - start)
         if update is None:
             return
-        front, rear = (turn.angle / (2.0 * wheel.alpha)
-                       for turn, wheel in ((truth.front, RIG.front), (truth.rear, RIG.rear)))
+        front, rear = (
+            turn.angle / (2.0 * wheel.alpha) for turn, wheel in ((truth.front, RIG.front), (truth.rear, RIG.rear))
+        )
         pitch = RIG.front.alpha + RIG.rear.alpha
         self._errors.append(math.degrees(math.remainder(update.phase.phi.angle - (front - rear) * pitch, pitch)))
         self._strikes += [(fall.wheel, fall.stamp_ns) for fall in update.footfalls]
@@ -177,8 +188,12 @@ class Score:
 
     def strikes(self, truth: Truth) -> float:
         """Root mean square error of the strikes' times [ms]."""
-        return rms([min((stamp_ns - other for other in truth.strikes[wheel]), key=abs) * 1e-6
-                    for wheel, stamp_ns in self._strikes])
+        return rms(
+            [
+                min((stamp_ns - other for other in truth.strikes[wheel]), key=abs) * 1e-6
+                for wheel, stamp_ns in self._strikes
+            ]
+        )
 
     def missed(self, truth: Truth) -> tuple[bool, ...]:
         """Which goals are missed: of φ, strikes, n, and pace."""
@@ -188,8 +203,10 @@ class Score:
     def row(self, truth: Truth, missed: tuple[bool, ...] = (False,) * 4) -> str:
         """The columns, and a mark at each goal that is missed."""
         phi, strikes, n, pace = ('!' if one else ' ' for one in missed)
-        return (f'{self.phi:7.3f}{phi}{self.strikes(truth):6.2f}{strikes}{self.wrong_n:4}{n}{100.0 * self.lost:6.1f} % '
-                f'{self.milliseconds:7.2f} {1e3 / self.milliseconds:5.0f}{pace}')
+        return (
+            f'{self.phi:7.3f}{phi}{self.strikes(truth):6.2f}{strikes}{self.wrong_n:4}{n}{100.0 * self.lost:6.1f} % '
+            f'{self.milliseconds:7.2f} {1e3 / self.milliseconds:5.0f}{pace}'
+        )
 
 
 def track(case: Case, detect: dict[str, Detect], seconds: float) -> tuple[Truth, dict[str, Score]]:
@@ -220,8 +237,9 @@ def pupil() -> dict[str, Detect]:
         return {}
     detector = Detector(f'tag{TAGS.family}')
     detector.tag_families.clear()  # its destructor would damage the heap
-    return {'pupil': lambda image, _: [
-        Detection(tag.tag_id, tag.corners[::-1] - 0.5) for tag in detector.detect(image)]}
+    return {
+        'pupil': lambda image, _: [Detection(tag.tag_id, tag.corners[::-1] - 0.5) for tag in detector.detect(image)]
+    }
 
 
 def main() -> None:

@@ -73,8 +73,12 @@ class Points(NamedTuple):
 
 def sweep(steps: int = 20) -> Points:
     """All points of the sweep."""
-    k, b, theta2 = (axis.ravel() for axis in np.meshgrid(
-        np.logspace(-4, -2, steps), np.logspace(-1, 1, steps), np.radians([-12, -8, -4, 0, 4, 8, 12]), indexing='ij'))
+    k, b, theta2 = (
+        axis.ravel()
+        for axis in np.meshgrid(
+            np.logspace(-4, -2, steps), np.logspace(-1, 1, steps), np.radians([-12, -8, -4, 0, 4, 8, 12]), indexing='ij'
+        )
+    )
     speed = limit_cycle_speed(RIG.front, RIG.slope, RIG.gravity)
     speeds = limit_cycle_speed(RIG.rear, RIG.slope, RIG.gravity, theta2)
     return Points(np.column_stack([np.full_like(k, -ALPHA), np.full_like(k, speed), theta2, speeds]), k, b)
@@ -84,11 +88,12 @@ def draw(points: Points, count: int) -> Points:
     """Some points whose wheels keep rolling forward, at random but always the same."""
     result = run_ensemble(RIG, points.states, SECONDS, CAPACITY, k=points.k, b=points.b)
     forward = (result.ends == End.TIME) & ~(result.strikes['direction'] == BACKWARD).any(axis=1)
-    print(f'{forward.sum()} of the sweep\'s {len(forward)} trajectories roll forward all the time')
+    print(f"{forward.sum()} of the sweep's {len(forward)} trajectories roll forward all the time")
     return points.take(np.random.default_rng(1).permutation(np.flatnonzero(forward))[:count])
 
 
 # Programs: each makes the strike times of all points.
+
 
 def with_ensemble(points: Points) -> Strikes:
     result = run_ensemble(RIG, points.states, SECONDS, CAPACITY, TAYLOR_TOLERANCE, k=points.k, b=points.b)
@@ -137,8 +142,16 @@ def scipy_strikes(y: list[float], k: float, b: float) -> list[float]:
         event.terminal, event.direction = True, 1.0  # type: ignore[attr-defined]
     t, S, times = 0.0, RIG.S0, []
     while t < SECONDS:
-        solution = solve_ivp(rates, (t, SECONDS), y, 'DOP853', events=(front, rear), args=(S,),
-                             rtol=SCIPY_TOLERANCE, atol=SCIPY_TOLERANCE)
+        solution = solve_ivp(
+            rates,
+            (t, SECONDS),
+            y,
+            'DOP853',
+            events=(front, rear),
+            args=(S,),
+            rtol=SCIPY_TOLERANCE,
+            atol=SCIPY_TOLERANCE,
+        )
         t, y = solution.t[-1], solution.y[:, -1].copy()
         for i in (0, 1):
             if solution.t_events[i].size:
@@ -161,16 +174,26 @@ class Heyoka:
         length = heyoka.sqrt((sin(theta1) - sin(theta2) + S) ** 2.0 + (cos(theta1) - cos(theta2)) ** 2.0)
         p1, p2 = sin(theta1 - theta2) + S * cos(theta1), sin(theta1 - theta2) + S * cos(theta2)
         pull = (k * (length - RIG.D0) + b * (p1 * omega1 - p2 * omega2) / length) / length
-        equations = [(theta1, omega1), (omega1, sin(theta1 + RIG.slope) - p1 * pull),
-                     (theta2, omega2), (omega2, sin(theta2 + RIG.slope) + p2 * pull)]
-        event, integrator = ((heyoka.t_event, heyoka.taylor_adaptive) if width == 1 else
-                             (heyoka.t_event_batch, heyoka.taylor_adaptive_batch))
-        events = [event(theta - ALPHA, callback=self._strike(i, width), direction=heyoka.event_direction.positive)
-                  for i, theta in enumerate((theta1, theta2))]
+        equations = [
+            (theta1, omega1),
+            (omega1, sin(theta1 + RIG.slope) - p1 * pull),
+            (theta2, omega2),
+            (omega2, sin(theta2 + RIG.slope) + p2 * pull),
+        ]
+        event, integrator = (
+            (heyoka.t_event, heyoka.taylor_adaptive)
+            if width == 1
+            else (heyoka.t_event_batch, heyoka.taylor_adaptive_batch)
+        )
+        events = [
+            event(theta - ALPHA, callback=self._strike(i, width), direction=heyoka.event_direction.positive)
+            for i, theta in enumerate((theta1, theta2))
+        ]
         shape = (4,) if width == 1 else (4, width)
         self._width, self._strikes = width, [[] for _ in range(width)]  # type: Any, Strikes
-        self._integrator = integrator(equations, np.zeros(shape), tol=HEYOKA_TOLERANCE, t_events=events,
-                                      pars=np.ones((3, *shape[1:])))
+        self._integrator = integrator(
+            equations, np.zeros(shape), tol=HEYOKA_TOLERANCE, t_events=events, pars=np.ones((3, *shape[1:]))
+        )
         # Views of the integrator's own memory.
         self._state, self._pars, self._time = self._integrator.state, self._integrator.pars, self._integrator.time
 
@@ -208,7 +231,7 @@ class Heyoka:
                 self._pars[row] = values if width > 1 else values[0]
             self._strikes[:] = [[] for _ in range(width)]
             integrator.propagate_until(SECONDS)
-            result += self._strikes[:len(points.k) - first]
+            result += self._strikes[: len(points.k) - first]
         return result
 
 
@@ -231,8 +254,9 @@ def measure(program: Callable[[Points], Strikes], points: Points, seconds: float
 
 def accuracy(strikes: Strikes, truth: Strikes) -> tuple[Floats, int]:
     """Errors of the strike times, and in how many trajectories their number is wrong."""
-    errors = [abs(a - b) for got, expected in zip(strikes, truth, strict=True)
-              for a, b in zip(got, expected, strict=False)]
+    errors = [
+        abs(a - b) for got, expected in zip(strikes, truth, strict=True) for a, b in zip(got, expected, strict=False)
+    ]
     wrong = sum(len(got) != len(expected) for got, expected in zip(strikes, truth, strict=True))
     return np.array(errors), wrong
 
@@ -271,9 +295,12 @@ def main() -> None:
         print(f'{name} …', end='\r', file=sys.stderr)
         taken, strikes = measure(program, points.take(np.tile(np.arange(len(truth)), copies)), options.seconds)
         scipy_time = taken if math.isnan(scipy_time) else scipy_time
-        errors, wrong = accuracy(strikes[:len(truth)], truth)
-        print(f'{name:34}{taken:10.1f}{scipy_time / taken:10.1f}{np.quantile(errors, 0.99):12.1e}{errors.max():12.1e}'
-              f'{wrong:8}', flush=True)
+        errors, wrong = accuracy(strikes[: len(truth)], truth)
+        print(
+            f'{name:34}{taken:10.1f}{scipy_time / taken:10.1f}{np.quantile(errors, 0.99):12.1e}{errors.max():12.1e}'
+            f'{wrong:8}',
+            flush=True,
+        )
 
 
 if __name__ == '__main__':

@@ -51,14 +51,32 @@ examples:
 nodes, each run by `ros2 run dcdrw NAME`:
   """ + ', '.join(node.name for node in EXECUTABLES)
 _COMMANDS = (
-    trial, live, record, replay, analyze, report, film, tag_sheet, track, calibrate, design, sweep, figures, regimes,
-    return_map, models, simulate, urdf)
+    trial,
+    live,
+    record,
+    replay,
+    analyze,
+    report,
+    film,
+    tag_sheet,
+    track,
+    calibrate,
+    design,
+    sweep,
+    figures,
+    regimes,
+    return_map,
+    models,
+    simulate,
+    urdf,
+)
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit status: 0 well, 1 the work failed, 2 the input was wrong."""
-    parser = argparse.ArgumentParser('dcdrw', description=_DESCRIPTION, epilog=_EPILOG,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        'dcdrw', description=_DESCRIPTION, epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument('--version', action='version', version=f'dcdrw {_version()}')
     commands = parser.add_subparsers(title='commands', metavar='COMMAND', required=True)
     for module in _COMMANDS:

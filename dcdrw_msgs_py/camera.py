@@ -54,8 +54,12 @@ def _distort(straight: Floats, coefficients: Floats) -> Floats:
     x, y = straight
     r2 = x * x + y * y
     radial = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)))
-    return np.stack((x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-                     y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y))
+    return np.stack(
+        (
+            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+        )
+    )
 
 
 def _undistort(bent: Floats, coefficients: Floats) -> Floats:
@@ -63,9 +67,14 @@ def _undistort(bent: Floats, coefficients: Floats) -> Floats:
     straight, step = bent.copy(), 1e-6
     error = _distort(straight, coefficients) - bent
     for _ in range(NEWTON_STEPS):
-        (a, c), (b, d) = ((_distort(straight + np.array(axis)[:, None] * step, coefficients)
-                           - _distort(straight - np.array(axis)[:, None] * step, coefficients)) / (2.0 * step)
-                          for axis in ((1.0, 0.0), (0.0, 1.0)))
+        (a, c), (b, d) = (
+            (
+                _distort(straight + np.array(axis)[:, None] * step, coefficients)
+                - _distort(straight - np.array(axis)[:, None] * step, coefficients)
+            )
+            / (2.0 * step)
+            for axis in ((1.0, 0.0), (0.0, 1.0))
+        )
         with np.errstate(divide='ignore', invalid='ignore'):
             straight = straight - np.stack((d * error[0] - b * error[1], a * error[1] - c * error[0])) / (a * d - b * c)
         error = _distort(straight, coefficients) - bent
@@ -88,8 +97,9 @@ def pinhole(width: int, height: int, field_of_view_deg: float) -> Camera:
     return make_camera(width, height, matrix, 'plumb_bob', ())
 
 
-def make_camera(width: int, height: int, matrix: ArrayLike, model: str, coefficients: Sequence[float],
-                source: str = 'camera_info') -> Camera:
+def make_camera(
+    width: int, height: int, matrix: ArrayLike, model: str, coefficients: Sequence[float], source: str = 'camera_info'
+) -> Camera:
     """A camera from the fields of a CameraInfo; no coefficients at all stand for no distortion.
 
     Raises:
@@ -103,14 +113,18 @@ def make_camera(width: int, height: int, matrix: ArrayLike, model: str, coeffici
         raise ValueError(f'{source}: camera_matrix.data must be 9 finite numbers, got {[float(x) for x in K.flat]}')
     K = K.reshape(3, 3)
     if not (K[0, 0] > 0.0 and K[1, 1] > 0.0):
-        raise ValueError(f'{source}: the focal lengths in camera_matrix.data must be > 0, got {K[0, 0]:g} and '
-                         f'{K[1, 1]:g}; calibrate the camera first (ros2 run camera_calibration cameracalibrator)')
+        raise ValueError(
+            f'{source}: the focal lengths in camera_matrix.data must be > 0, got {K[0, 0]:g} and '
+            f'{K[1, 1]:g}; calibrate the camera first (ros2 run camera_calibration cameracalibrator)'
+        )
     if model not in MODELS:
         raise ValueError(f'{source}: distortion_model must be {" or ".join(MODELS)}, got {model!r}')
     D = np.array(coefficients, float).ravel()
     if len(D) not in (0, 4, MODELS[model]) or not np.isfinite(D).all():  # 4: k3 left out
-        raise ValueError(f'{source}: distortion_coefficients.data of {model} must be {MODELS[model]} finite numbers, '
-                         f'got {D.tolist()}')
+        raise ValueError(
+            f'{source}: distortion_coefficients.data of {model} must be {MODELS[model]} finite numbers, '
+            f'got {D.tolist()}'
+        )
     return Camera(int(width), int(height), K, np.pad(D, (0, MODELS[model] - len(D))))
 
 
@@ -139,8 +153,13 @@ def read_camera(path: Path) -> Camera:
         return value
 
     return make_camera(
-        entry('image_width', int), entry('image_height', int), entry('camera_matrix.data', list),
-        entry('distortion_model', str), entry('distortion_coefficients.data', list), str(path))
+        entry('image_width', int),
+        entry('image_height', int),
+        entry('camera_matrix.data', list),
+        entry('distortion_model', str),
+        entry('distortion_coefficients.data', list),
+        str(path),
+    )
 
 
 _KINDS: dict[type, str] = {int: 'a whole number', list: 'a list of numbers', str: 'a string'}
@@ -148,16 +167,22 @@ _KINDS: dict[type, str] = {int: 'a whole number', list: 'a list of numbers', str
 
 def write_camera(path: Path, camera: Camera, name: str = 'camera') -> None:
     """Write the file that `read_camera` and ROS's camera drivers read."""
-    Path(path).write_text(yaml.safe_dump({
-        'image_width': camera.width,
-        'image_height': camera.height,
-        'camera_name': name,
-        'camera_matrix': _matrix(camera.matrix),
-        'distortion_model': camera.model,
-        'distortion_coefficients': _matrix(camera.distortion[None]),
-        'rectification_matrix': _matrix(np.eye(3)),
-        'projection_matrix': _matrix(np.pad(camera.matrix, ((0, 0), (0, 1)))),
-    }, sort_keys=False), encoding='utf-8')
+    Path(path).write_text(
+        yaml.safe_dump(
+            {
+                'image_width': camera.width,
+                'image_height': camera.height,
+                'camera_name': name,
+                'camera_matrix': _matrix(camera.matrix),
+                'distortion_model': camera.model,
+                'distortion_coefficients': _matrix(camera.distortion[None]),
+                'rectification_matrix': _matrix(np.eye(3)),
+                'projection_matrix': _matrix(np.pad(camera.matrix, ((0, 0), (0, 1)))),
+            },
+            sort_keys=False,
+        ),
+        encoding='utf-8',
+    )
 
 
 def _matrix(values: Floats) -> dict[str, Any]:

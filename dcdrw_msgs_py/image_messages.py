@@ -15,8 +15,15 @@ from dcdrw_msgs_py.messages import stamp_ns, to_stamp
 from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.samples import PoseSample
 
-ENCODINGS = {'mono8': (1, 1), '8UC1': (1, 1), 'mono16': (1, 2), '16UC1': (1, 2), 'bgr8': (3, 1), '8UC3': (3, 1),
-             'rgb8': (3, 1)}
+ENCODINGS = {
+    'mono8': (1, 1),
+    '8UC1': (1, 1),
+    'mono16': (1, 2),
+    '16UC1': (1, 2),
+    'bgr8': (3, 1),
+    '8UC3': (3, 1),
+    'rgb8': (3, 1),
+}
 """Encodings that are read: how many channels each has, and how many bytes a channel."""
 
 
@@ -41,7 +48,7 @@ def _picture(message: Any) -> Picture:
         raise ValueError(f'{data.size} bytes in rows of {step} are no {encoding} picture of {width}x{height}')
     rows = np.lib.stride_tricks.as_strided(data, (height, row), (step, 1), writeable=False)
     if size == 2:  # the upper byte of each
-        return rows[:, 0 if message.is_bigendian else 1::2]
+        return rows[:, 0 if message.is_bigendian else 1 :: 2]
     if channels == 1:
         return rows
     colours = rows.reshape(height, width, channels)
@@ -101,8 +108,14 @@ def camera_message(camera: Camera, stamp: int, frame_id: str = 'camera') -> Any:
 
 def tag_message(wheel: str, tag: int, corners: Any, stamp: int, frame_id: str = 'camera') -> Any:
     """One tag as `tag_detections` carries it: its corners (4, 2) [px], from the top left of the upright tag on."""
-    message = ImageMarker(ns=wheel, id=tag, type=ImageMarker.POLYGON, action=ImageMarker.ADD, scale=2.0,
-                          outline_color=ColorRGBA(r=1.0, g=0.5, b=0.1, a=1.0))
+    message = ImageMarker(
+        ns=wheel,
+        id=tag,
+        type=ImageMarker.POLYGON,
+        action=ImageMarker.ADD,
+        scale=2.0,
+        outline_color=ColorRGBA(r=1.0, g=0.5, b=0.1, a=1.0),
+    )
     message.header.stamp, message.header.frame_id = to_stamp(stamp), frame_id
     message.points = [Point(x=x, y=y) for x, y in corners.tolist()]
     return message

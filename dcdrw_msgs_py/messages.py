@@ -62,7 +62,9 @@ class Joints:
         speeds = velocities if len(velocities) == count else None
         forces = efforts if len(efforts) == count else None
         return [
-            (math.nan, math.nan, math.nan) if place < 0 else (
+            (math.nan, math.nan, math.nan)
+            if place < 0
+            else (
                 positions[place],
                 speeds[place] if speeds is not None else math.nan,
                 forces[place] if forces is not None else math.nan,
@@ -95,8 +97,13 @@ class JointSampleReader:
 
         """
         front, rear, coupler = self._joints.read(message)
-        return JointSample(stamp_ns(message.header.stamp), Turn(*front[:2]), Turn(*rear[:2]), CouplerSample(*coupler),
-                           run_of(message.header.frame_id))
+        return JointSample(
+            stamp_ns(message.header.stamp),
+            Turn(*front[:2]),
+            Turn(*rear[:2]),
+            CouplerSample(*coupler),
+            run_of(message.header.frame_id),
+        )
 
 
 class PhaseSampleReader:
@@ -116,8 +123,13 @@ class PhaseSampleReader:
         if not math.isfinite(difference):
             raise ValueError(f'{STEP_DIFFERENCE_JOINT} must be a number, got {difference}')
         return PhaseSample(
-            stamp_ns(message.header.stamp), Turn(*front[:2]), Turn(*rear[:2]), Turn(*phi[:2]), round(difference),
-            run_of(message.header.frame_id))
+            stamp_ns(message.header.stamp),
+            Turn(*front[:2]),
+            Turn(*rear[:2]),
+            Turn(*phi[:2]),
+            round(difference),
+            run_of(message.header.frame_id),
+        )
 
 
 class JointSampleWriter:
@@ -170,8 +182,9 @@ def footfall(message: Any) -> Footfall:
 def diagnostics_message(name: str, diagnosis: Diagnosis, now_ns: int) -> Any:
     """One node's diagnosis as `/diagnostics` carries it."""
     values = [KeyValue(key=key, value=value) for key, value in diagnosis.values.items()]
-    status = DiagnosticStatus(level=bytes([diagnosis.level]), name=name, message=diagnosis.message,
-                              hardware_id=SUITE, values=values)
+    status = DiagnosticStatus(
+        level=bytes([diagnosis.level]), name=name, message=diagnosis.message, hardware_id=SUITE, values=values
+    )
     message = DiagnosticArray(status=[status])
     message.header.stamp = to_stamp(now_ns)
     return message

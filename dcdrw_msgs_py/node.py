@@ -42,8 +42,13 @@ class Parameters(Generic[Params]):
 
     """
 
-    def __init__(self, node: Node, params: type[Params], on_change: Callable[[Params], None] | None = None,
-                 validate: Callable[[Params], object] | None = None) -> None:
+    def __init__(
+        self,
+        node: Node,
+        params: type[Params],
+        on_change: Callable[[Params], None] | None = None,
+        validate: Callable[[Params], object] | None = None,
+    ) -> None:
         self._params, self._on_change, self._further = params, on_change, validate
         self._fields = {field.name: field for field in fields(params)}
         values = {
@@ -84,8 +89,12 @@ def _descriptor(field: Field) -> Any:
     default = f'; default: {quantity.derived}' if quantity.derived else ''
     unit = f' [{quantity.unit}]' if quantity.unit else ''
     return ParameterDescriptor(
-        name=field.name, description=f'{quantity.doc}{unit}{default}', additional_constraints=quantity.bounds,
-        read_only=not quantity.live, dynamic_typing=True)  # dynamic: a YAML integer does for a double
+        name=field.name,
+        description=f'{quantity.doc}{unit}{default}',
+        additional_constraints=quantity.bounds,
+        read_only=not quantity.live,
+        dynamic_typing=True,
+    )  # dynamic: a YAML integer does for a double
 
 
 def message_type(topic: Topic) -> Any:
@@ -105,8 +114,9 @@ def listen(node: Node, topic: Topic, callback: Callable[[Any], None], depth: int
     """Subscribe so that reliable and best-effort publishers both match; to a latched topic, as it is published."""
     qos = QoSProfile(depth=max(topic.depth, depth), reliability=ReliabilityPolicy.BEST_EFFORT)
     if topic.latched:
-        qos = QoSProfile(depth=topic.depth, reliability=ReliabilityPolicy.RELIABLE,
-                         durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        qos = QoSProfile(
+            depth=topic.depth, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+        )
     return node.create_subscription(message_type(topic), topic.name, callback, qos)
 
 

@@ -23,8 +23,10 @@ def opencv() -> Any:
     except ImportError:
         raise ValueError("pictures need OpenCV: apt install python3-opencv, or pip install 'dcdrw[camera]'") from None
     if not hasattr(cv2, 'aruco'):  # PyPI's opencv-python before 4.7
-        raise ValueError(f'OpenCV {cv2.__version__} is here without its ArUco module: pip install '
-                         "'opencv-python-headless>=4.7', or opencv-contrib-python-headless of the same version")
+        raise ValueError(
+            f'OpenCV {cv2.__version__} is here without its ArUco module: pip install '
+            "'opencv-python-headless>=4.7', or opencv-contrib-python-headless of the same version"
+        )
     return cv2
 
 
@@ -47,5 +49,5 @@ def tag_cells(family: str, tag: int) -> NDArray[np.bool_]:
     across, size = FAMILIES[family]
     if not 0 <= tag < size:
         raise ValueError(f'family {family} has the tags 0 to {size - 1}, not {tag}')
-    cells = opencv().aruco.Dictionary_getBitsFromByteList(tag_dictionary(family).bytesList[tag:tag + 1], across)
+    cells = opencv().aruco.Dictionary_getBitsFromByteList(tag_dictionary(family).bytesList[tag : tag + 1], across)
     return np.pad(np.rot90(cells, 2) > 0, 1)

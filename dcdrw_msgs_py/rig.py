@@ -60,10 +60,14 @@ class WheelParams(NamedTuple):
 
 
 StanceDistance = Annotated[
-    float, Quantity('distance of the stance feet just before a strike of the front wheel, x1 − x2', 'm',
-                    derived='ℓ of the front wheel')]
-Slope = Annotated[
-    float, Quantity('slope γ, positive downhill', 'rad', low=-math.pi / 4, high=math.pi / 4, live=True)]
+    float,
+    Quantity(
+        'distance of the stance feet just before a strike of the front wheel, x1 − x2',
+        'm',
+        derived='ℓ of the front wheel',
+    ),
+]
+Slope = Annotated[float, Quantity('slope γ, positive downhill', 'rad', low=-math.pi / 4, high=math.pi / 4, live=True)]
 
 
 class RigParams(NamedTuple):
@@ -73,8 +77,10 @@ class RigParams(NamedTuple):
     rear: WheelParams = WheelParams()
     k: Annotated[float, Quantity('stiffness of the coupler', 'N/m', low=0.0, live=True)] = 5.25
     b: Annotated[float, Quantity('damping of the coupler', 'N·s/m', low=0.0, live=True)] = 100.0
-    D0: Annotated[float, Quantity('length of the coupler at rest', 'm', low=0.0, live=True,
-                                  derived='S0 + ℓ sin α: at rest at φ = α')] = math.nan
+    D0: Annotated[
+        float,
+        Quantity('length of the coupler at rest', 'm', low=0.0, live=True, derived='S0 + ℓ sin α: at rest at φ = α'),
+    ] = math.nan
     S0: StanceDistance = math.nan
     slope: Slope = math.radians(2.0)
     gravity: Annotated[float, Quantity('gravitational acceleration g', 'm/s²', above=0.0)] = 9.81

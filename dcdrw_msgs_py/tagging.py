@@ -36,12 +36,12 @@ class TagGroup(NamedTuple):
     ids: Annotated[tuple[int, ...], Quantity('ids of the tags', low=0)] = (0,)
     angles_deg: Annotated[
         tuple[float, ...],
-        Quantity("turn of each tag's upright from the slope normal at ψ = 0, positive rolling downhill", 'deg')
+        Quantity("turn of each tag's upright from the slope normal at ψ = 0, positive rolling downhill", 'deg'),
     ] = (0.0,)
-    x: Annotated[
-        tuple[float, ...], Quantity("each tag's centre from the hub, downhill at ψ = 0", 'm')] = (0.0,)
+    x: Annotated[tuple[float, ...], Quantity("each tag's centre from the hub, downhill at ψ = 0", 'm')] = (0.0,)
     y: Annotated[
-        tuple[float, ...], Quantity("each tag's centre from the hub, along the slope normal at ψ = 0", 'm')] = (0.0,)
+        tuple[float, ...], Quantity("each tag's centre from the hub, along the slope normal at ψ = 0", 'm')
+    ] = (0.0,)
 
 
 class TagParams(NamedTuple):
@@ -82,15 +82,20 @@ def mounts(params: TagParams) -> tuple[Mount, ...]:
     for wheel, group in ((FRONT, params.front), (REAR, params.rear)):
         for name, values in group._asdict().items():
             if len(values) != len(group.ids):
-                raise ValueError(f'{wheel}.{name} must have one entry for each of {wheel}.ids {list(group.ids)}, '
-                                 f'got {list(values)}')
+                raise ValueError(
+                    f'{wheel}.{name} must have one entry for each of {wheel}.ids {list(group.ids)}, got {list(values)}'
+                )
         for tag, angle_deg, x, y in zip(*group, strict=True):
             if tag in found:
-                raise ValueError(f'{wheel}.ids: tag {tag} is mounted twice, on the {found[tag].wheel} wheel and on the '
-                                 f'{wheel} wheel; every tag of the rig needs an id of its own')
+                raise ValueError(
+                    f'{wheel}.ids: tag {tag} is mounted twice, on the {found[tag].wheel} wheel and on the '
+                    f'{wheel} wheel; every tag of the rig needs an id of its own'
+                )
             if tag >= FAMILIES[params.family].size:
-                raise ValueError(f'{wheel}.ids: family {params.family} has no tag {tag}, only 0 to '
-                                 f'{FAMILIES[params.family].size - 1}')
+                raise ValueError(
+                    f'{wheel}.ids: family {params.family} has no tag {tag}, only 0 to '
+                    f'{FAMILIES[params.family].size - 1}'
+                )
             found[tag] = Mount(wheel, tag, math.radians(angle_deg), x, y, params.size)
     return tuple(found.values())
 

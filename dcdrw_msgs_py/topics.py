@@ -19,35 +19,57 @@ class Topic(NamedTuple):
 # 1000 messages are a second at 1 kHz: a reader that stalls for 50 ms loses nothing.
 SAMPLE_DEPTH = 1000
 
-JOINT_STATES = Topic('joint_states', 'sensor_msgs/msg/JointState',
-                     'rotation and speed of both wheels; the coupler where known', SAMPLE_DEPTH)
-COUPLER_FORCE_COMMAND = Topic('coupler_force_command', 'std_msgs/msg/Float64',
-                              'force added to the coupler, N; zero when stale')
-PHASE_STATE = Topic('phase_state', 'sensor_msgs/msg/JointState',
-                    'stance angles, φ and step difference', SAMPLE_DEPTH)
+JOINT_STATES = Topic(
+    'joint_states',
+    'sensor_msgs/msg/JointState',
+    'rotation and speed of both wheels; the coupler where known',
+    SAMPLE_DEPTH,
+)
+COUPLER_FORCE_COMMAND = Topic(
+    'coupler_force_command', 'std_msgs/msg/Float64', 'force added to the coupler, N; zero when stale'
+)
+PHASE_STATE = Topic('phase_state', 'sensor_msgs/msg/JointState', 'stance angles, φ and step difference', SAMPLE_DEPTH)
 PHI = Topic('phi', 'std_msgs/msg/Float64', 'φ, rad', SAMPLE_DEPTH)
 STEP_DIFFERENCE = Topic('step_difference', 'std_msgs/msg/Int32', 'n = n1 − n2', SAMPLE_DEPTH)
-FOOTFALLS = Topic('footfalls', 'geometry_msgs/msg/PointStamped',
-                  'one per strike: wheel, time, place x, step number z', SAMPLE_DEPTH)
+FOOTFALLS = Topic(
+    'footfalls', 'geometry_msgs/msg/PointStamped', 'one per strike: wheel, time, place x, step number z', SAMPLE_DEPTH
+)
 SYNC_ERROR = Topic('sync_error', 'std_msgs/msg/Float64', 'e, rad', SAMPLE_DEPTH)
 SYNC_ERROR_PERCENT = Topic('sync_error_percent', 'std_msgs/msg/Float64', 'e, percent of a step', SAMPLE_DEPTH)
 SYNCHRONIZED = Topic('synchronized', 'std_msgs/msg/Bool', 'whether the pair walks in step', 1, latched=True)
 RIG_MARKERS = Topic('rig_markers', 'visualization_msgs/msg/MarkerArray', 'the rig, drawn, at most 30 Hz')
 IMAGE_RAW = Topic('image_raw', 'sensor_msgs/msg/Image', 'the rig as a camera on its left sees it', 2)
 CAMERA_INFO = Topic('camera_info', 'sensor_msgs/msg/CameraInfo', 'lens and sensor of that camera', 2)
-IMAGE_COMPRESSED = Topic('image_raw/compressed', 'sensor_msgs/msg/CompressedImage',
-                         'the same, as JPEG or PNG; follows the name of image_raw', 2)
-FRONT_POSE = Topic('front_pose', 'geometry_msgs/msg/PoseStamped',
-                   'front wheel as motion capture sees it: hub and turn, z up', SAMPLE_DEPTH)
+IMAGE_COMPRESSED = Topic(
+    'image_raw/compressed',
+    'sensor_msgs/msg/CompressedImage',
+    'the same, as JPEG or PNG; follows the name of image_raw',
+    2,
+)
+FRONT_POSE = Topic(
+    'front_pose',
+    'geometry_msgs/msg/PoseStamped',
+    'front wheel as motion capture sees it: hub and turn, z up',
+    SAMPLE_DEPTH,
+)
 REAR_POSE = Topic('rear_pose', 'geometry_msgs/msg/PoseStamped', 'rear wheel, likewise', SAMPLE_DEPTH)
-TAG_DETECTIONS = Topic('tag_detections', 'visualization_msgs/msg/ImageMarker',
-                       'one per tag of a frame: ns the wheel, id the tag, points its corners in pixels', SAMPLE_DEPTH)
-DEBUG_IMAGE = Topic('debug_image', 'sensor_msgs/msg/Image',
-                    'tags, hubs, spokes and stance legs drawn over the picture, while somebody subscribes', 2)
+TAG_DETECTIONS = Topic(
+    'tag_detections',
+    'visualization_msgs/msg/ImageMarker',
+    'one per tag of a frame: ns the wheel, id the tag, points its corners in pixels',
+    SAMPLE_DEPTH,
+)
+DEBUG_IMAGE = Topic(
+    'debug_image',
+    'sensor_msgs/msg/Image',
+    'tags, hubs, spokes and stance legs drawn over the picture, while somebody subscribes',
+    2,
+)
 DIAGNOSTICS = Topic('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', 'health, 1 Hz')
 CLOCK = Topic('/clock', 'rosgraph_msgs/msg/Clock', 'simulated time, when asked')
-PARAMETER_EVENTS = Topic('/parameter_events', 'rcl_interfaces/msg/ParameterEvent', 'changes of parameters',
-                         SAMPLE_DEPTH)
+PARAMETER_EVENTS = Topic(
+    '/parameter_events', 'rcl_interfaces/msg/ParameterEvent', 'changes of parameters', SAMPLE_DEPTH
+)
 
 # Names of the joints in joint_states and phase_state.
 FRONT_WHEEL, REAR_WHEEL, COUPLER = 'front_wheel', 'rear_wheel', 'coupler'

@@ -17,16 +17,26 @@ SWITCH = ('true', 'false')
 ARGUMENTS = {
     'source': ('sim', 'sim: the simulator; rig: a camera and the tag tracker; recording: replayed', SOURCES),
     'recording': ('', 'the recording to replay', None),
-    'camera': ('', 'rig: a camera (0, /dev/video0, rtsp://…) or a video file that the tag tracker opens itself '
-                   '(default: the topic image_raw)', None),
+    'camera': (
+        '',
+        'rig: a camera (0, /dev/video0, rtsp://…) or a video file that the tag tracker opens itself '
+        '(default: the topic image_raw)',
+        None,
+    ),
     'calibration': ('', 'rig: a camera_info file, which `camera` needs (default: the topic camera_info)', None),
     'params_file': ('', 'a parameter file for all nodes, as share/dcdrw/config/rig.yaml', None),
     'namespace': ('', 'of all nodes', None),
     'initial_phase_percent': ('', 'sim: phase at the start, percent of a step', None),
-    'real_time_factor': ('', 'sim, recording: seconds of the rig per second; sim: 0 is as fast as possible, and '
-                             'it implies simulated_time', None),
-    'simulated_time': ('false', 'sim: the simulator publishes /clock, and the other nodes follow it; a recording '
-                                'always does', SWITCH),
+    'real_time_factor': (
+        '',
+        'sim, recording: seconds of the rig per second; sim: 0 is as fast as possible, and it implies simulated_time',
+        None,
+    ),
+    'simulated_time': (
+        'false',
+        'sim: the simulator publishes /clock, and the other nodes follow it; a recording always does',
+        SWITCH,
+    ),
     'record': ('false', 'record all topics of the suite', SWITCH),
     'folder': ('', 'of what is recorded (default: recordings/DATE-TIME)', None),
     'live': ('false', 'serve the page of `dcdrw live`; its button starts the recorder', SWITCH),
@@ -45,18 +55,28 @@ def _actions(context):
 
     def node(name, **parameters):
         file = [chosen['params_file']] if chosen['params_file'] else []
-        return Node(package='dcdrw', executable=name, name=name, namespace=chosen['namespace'], output='screen',
-                    parameters=[*file, {'use_sim_time': simulated, **parameters}])
+        return Node(
+            package='dcdrw',
+            executable=name,
+            name=name,
+            namespace=chosen['namespace'],
+            output='screen',
+            parameters=[*file, {'use_sim_time': simulated, **parameters}],
+        )
 
     def texts(**arguments):
         """Parameters from the arguments that are given; a text stays one, were it a number."""
-        return {name: ParameterValue(chosen[argument], value_type=str)
-                for name, argument in arguments.items() if chosen[argument]}
+        return {
+            name: ParameterValue(chosen[argument], value_type=str)
+            for name, argument in arguments.items()
+            if chosen[argument]
+        }
 
     def command(name, *arguments):
         namespace = ['--namespace', chosen['namespace']] if chosen['namespace'] else []
-        return ExecuteProcess(cmd=[ExecutableInPackage('dcdrw', 'dcdrw'), name, *arguments, *namespace],
-                              output='screen')
+        return ExecuteProcess(
+            cmd=[ExecutableInPackage('dcdrw', 'dcdrw'), name, *arguments, *namespace], output='screen'
+        )
 
     # First what may not be installed: a launch that fails must not leave nodes behind.
     actions = _rviz(chosen, simulated) if on['rviz'] else []
@@ -85,18 +105,33 @@ def _rviz(chosen, simulated):
     urdf = make_urdf(rig, fixed_coupler=chosen['source'] != 'sim')
     config = PathJoinSubstitution([FindPackageShare('dcdrw'), 'rviz', 'dcdrw.rviz'])
     return [
-        Node(package='robot_state_publisher', executable='robot_state_publisher', namespace=namespace, output='screen',
-             parameters=[{'robot_description': ParameterValue(urdf, value_type=str), 'use_sim_time': simulated}]),
-        Node(package='rviz2', executable='rviz2', namespace=namespace, arguments=['-d', config], output='screen',
-             parameters=[{'use_sim_time': simulated}],
-             remappings=[(f'/{topic}', topic) for topic in ('rig_markers', 'robot_description', 'debug_image')]),
+        Node(
+            package='robot_state_publisher',
+            executable='robot_state_publisher',
+            namespace=namespace,
+            output='screen',
+            parameters=[{'robot_description': ParameterValue(urdf, value_type=str), 'use_sim_time': simulated}],
+        ),
+        Node(
+            package='rviz2',
+            executable='rviz2',
+            namespace=namespace,
+            arguments=['-d', config],
+            output='screen',
+            parameters=[{'use_sim_time': simulated}],
+            remappings=[(f'/{topic}', topic) for topic in ('rig_markers', 'robot_description', 'debug_image')],
+        ),
     ]
 
 
 def generate_launch_description():
     """Estimator and monitor, the source that is asked for, and the tools that are switched on."""
-    return LaunchDescription([
-        *(DeclareLaunchArgument(name, default_value=default, description=doc, choices=choices)
-          for name, (default, doc, choices) in ARGUMENTS.items()),
-        OpaqueFunction(function=_actions),
-    ])
+    return LaunchDescription(
+        [
+            *(
+                DeclareLaunchArgument(name, default_value=default, description=doc, choices=choices)
+                for name, (default, doc, choices) in ARGUMENTS.items()
+            ),
+            OpaqueFunction(function=_actions),
+        ]
+    )

@@ -10,5 +10,6 @@ from launch.substitutions import ThisLaunchFileDir
 
 def generate_launch_description():
     """Tag tracker, estimator and monitor."""
-    return LaunchDescription([
-        IncludeLaunchDescription([ThisLaunchFileDir(), '/dcdrw.launch.py'], launch_arguments=[('source', 'rig')])])
+    return LaunchDescription(
+        [IncludeLaunchDescription([ThisLaunchFileDir(), '/dcdrw.launch.py'], launch_arguments=[('source', 'rig')])]
+    )

@@ -7,5 +7,6 @@ from launch.substitutions import ThisLaunchFileDir
 
 def generate_launch_description():
     """Simulator, estimator and monitor."""
-    return LaunchDescription([
-        IncludeLaunchDescription([ThisLaunchFileDir(), '/dcdrw.launch.py'], launch_arguments=[('source', 'sim')])])
+    return LaunchDescription(
+        [IncludeLaunchDescription([ThisLaunchFileDir(), '/dcdrw.launch.py'], launch_arguments=[('source', 'sim')])]
+    )

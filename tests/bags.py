@@ -12,18 +12,32 @@ TYPES = get_typestore(Stores.ROS2_JAZZY)
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 
 
-def joint_state(stamp_ns: int, names: Iterable[str], position: Iterable[float], velocity: Iterable[float] = (),
-                effort: Iterable[float] = (), frame: str = '', little_endian: bool = True) -> bytes:
+def joint_state(
+    stamp_ns: int,
+    names: Iterable[str],
+    position: Iterable[float],
+    velocity: Iterable[float] = (),
+    effort: Iterable[float] = (),
+    frame: str = '',
+    little_endian: bool = True,
+) -> bytes:
     """A serialized JointState."""
     time = TYPES.types['builtin_interfaces/msg/Time'](stamp_ns // 10**9, stamp_ns % 10**9)
     message = TYPES.types[JOINT_STATE](
-        TYPES.types['std_msgs/msg/Header'](time, frame), list(names),
-        *(np.array(list(column), float) for column in (position, velocity, effort)))
+        TYPES.types['std_msgs/msg/Header'](time, frame),
+        list(names),
+        *(np.array(list(column), float) for column in (position, velocity, effort)),
+    )
     return bytes(TYPES.serialize_cdr(message, JOINT_STATE, little_endian=little_endian))
 
 
-def write_bag(path: Path, messages: Iterable[tuple[int, bytes]], topic: str = '/joint_states',
-              storage: StoragePlugin = StoragePlugin.MCAP, compression: CompressionMode = CompressionMode.NONE) -> Path:
+def write_bag(
+    path: Path,
+    messages: Iterable[tuple[int, bytes]],
+    topic: str = '/joint_states',
+    storage: StoragePlugin = StoragePlugin.MCAP,
+    compression: CompressionMode = CompressionMode.NONE,
+) -> Path:
     """Write log times and messages."""
     writer = Writer(path, version=9, storage_plugin=storage)
     writer.set_compression(compression, CompressionFormat.ZSTD)

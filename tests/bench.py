@@ -51,12 +51,16 @@ class Bench:
 
     def start(self, name: str, *arguments: str, **parameters: Any) -> subprocess.Popen[bytes]:
         """Start a node with parameters; double underscores stand for dots."""
-        overrides = [part for key, value in parameters.items()
-                     for part in ('-p', f'{key.replace("__", ".")}:={_yaml(value)}')]
+        overrides = [
+            part for key, value in parameters.items() for part in ('-p', f'{key.replace("__", ".")}:={_yaml(value)}')
+        ]
         with (self.folder / f'{name}.log').open('ab') as log:
             process = subprocess.Popen(
-                [sys.executable, '-m', MODULES[name], '--ros-args', *overrides, *arguments], stdout=log,
-                stderr=subprocess.STDOUT, env={**os.environ, 'ROS_DOMAIN_ID': str(self.domain)})
+                [sys.executable, '-m', MODULES[name], '--ros-args', *overrides, *arguments],
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, 'ROS_DOMAIN_ID': str(self.domain)},
+            )
         self.processes.append(process)
         return process
 
@@ -77,6 +81,7 @@ class Bench:
 
     def wake(self, publisher: Any, message: Callable[[int], Any], *answers: list[Any]) -> None:
         """Send messages with growing stamps until each answer has come, so that the way is open; then forget them."""
+
         def answered() -> bool:
             publisher.publish(message(self.node.get_clock().now().nanoseconds))
             self.spin(0.02)

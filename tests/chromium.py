@@ -32,11 +32,23 @@ class Chromium:
     """A browser process; `tab` opens a page."""
 
     def __init__(self, folder: Path) -> None:
-        flags = ['--headless=new', '--no-sandbox', '--disable-gpu', '--disable-dev-shm-usage', '--no-first-run',
-                 '--disable-background-networking', '--disable-breakpad', '--remote-debugging-port=0',
-                 f'--user-data-dir={folder}']
-        self._process = subprocess.Popen([executable(), *flags, 'about:blank'], stdout=subprocess.DEVNULL,
-                                         stderr=subprocess.DEVNULL, start_new_session=True)
+        flags = [
+            '--headless=new',
+            '--no-sandbox',
+            '--disable-gpu',
+            '--disable-dev-shm-usage',
+            '--no-first-run',
+            '--disable-background-networking',
+            '--disable-breakpad',
+            '--remote-debugging-port=0',
+            f'--user-data-dir={folder}',
+        ]
+        self._process = subprocess.Popen(
+            [executable(), *flags, 'about:blank'],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
         self.loop = asyncio.new_event_loop()
         self._tabs: list[Tab] = []
         self.session = self.loop.run_until_complete(_session())
@@ -115,10 +127,13 @@ class Tab:
         self.wait('document.readyState === "complete"')
 
     def look(self, width: int, height: int, dark: bool = False) -> None:
-        self.send('Emulation.setDeviceMetricsOverride', width=width, height=height,
-                  deviceScaleFactor=1, mobile=width < 600)
-        self.send('Emulation.setEmulatedMedia', features=[
-            {'name': 'prefers-color-scheme', 'value': 'dark' if dark else 'light'}])
+        self.send(
+            'Emulation.setDeviceMetricsOverride', width=width, height=height, deviceScaleFactor=1, mobile=width < 600
+        )
+        self.send(
+            'Emulation.setEmulatedMedia',
+            features=[{'name': 'prefers-color-scheme', 'value': 'dark' if dark else 'light'}],
+        )
 
     def value(self, expression: str) -> Any:
         """What a JavaScript expression comes to."""

@@ -29,7 +29,27 @@ def live_trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp('trial')
     (folder / 'rig.yaml').write_text(STIFF)
     subprocess.run(
-        [sys.executable, '-m', 'dcdrw.cli', 'trial', '--rig', 'rig.yaml', '--initial-phase', '35', '--seconds', '5',
-         '--note', 'first: "with" new springs', '--quiet', '--out', 'out'],
-        cwd=folder, env={**os.environ, 'PYTHONPATH': str(ROOT)}, check=True, timeout=120, stdout=subprocess.DEVNULL)
+        [
+            sys.executable,
+            '-m',
+            'dcdrw.cli',
+            'trial',
+            '--rig',
+            'rig.yaml',
+            '--initial-phase',
+            '35',
+            '--seconds',
+            '5',
+            '--note',
+            'first: "with" new springs',
+            '--quiet',
+            '--out',
+            'out',
+        ],
+        cwd=folder,
+        env={**os.environ, 'PYTHONPATH': str(ROOT)},
+        check=True,
+        timeout=120,
+        stdout=subprocess.DEVNULL,
+    )
     return folder / 'out'

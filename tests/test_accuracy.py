@@ -21,8 +21,9 @@ def test_noisy_lossy_trials_are_followed():
     phase_errors, strike_errors = [], []
     for trial_number in range(TRIALS):
         speeds_given = trial_number % 2 == 0
-        rig = RigParams(k=random.uniform(2.0, 60.0), b=random.uniform(30.0, 120.0),
-                        slope=math.radians(random.uniform(1.8, 3.0)))
+        rig = RigParams(
+            k=random.uniform(2.0, 60.0), b=random.uniform(30.0, 120.0), slope=math.radians(random.uniform(1.8, 3.0))
+        )
         start = SimulatorParams(initial_phase_percent=random.uniform(7.0, 93.0)).start(rig)
         trial = run(*start, seconds=SECONDS)
         times = np.arange(0.0, trial.duration, 1.0 / RATE)
@@ -38,8 +39,10 @@ def test_noisy_lossy_trials_are_followed():
             falls.extend(update.footfalls)
 
         pitch = 2.0 * rig.front.alpha
-        strikes = {wheel: np.array([strike.t for strike in trial.strikes if strike.wheel == i])
-                   for i, wheel in ((1, FRONT), (2, REAR))}
+        strikes = {
+            wheel: np.array([strike.t for strike in trial.strikes if strike.wheel == i])
+            for i, wheel in ((1, FRONT), (2, REAR))
+        }
         every = np.sort(np.concatenate(list(strikes.values())))
         distance = np.min(np.abs(times[:, None] - every[None, :]), axis=1)
         differences = np.array([estimate.step_difference for estimate in estimates])
@@ -53,7 +56,7 @@ def test_noisy_lossy_trials_are_followed():
             found = np.array([fall.stamp_ns * 1e-9 for fall in falls if fall.wheel == wheel])
             # The last strike may be told only by samples after the end.
             assert len(times_of) - len(found) in (0, 1)
-            strike_errors.append(found - times_of[:len(found)])
+            strike_errors.append(found - times_of[: len(found)])
     phase_rms = math.sqrt(np.mean(np.concatenate(phase_errors) ** 2))
     strike_rms = math.sqrt(np.mean(np.concatenate(strike_errors) ** 2))
     print(f'φ {phase_rms:.3f}° rms, strikes {1e3 * strike_rms:.2f} ms rms')

@@ -3,6 +3,7 @@
 import signal
 from itertools import pairwise
 
+import pytest
 from std_srvs.srv import SetBool
 
 from dcdrw_msgs_py.messages import PhaseSampleReader
@@ -11,6 +12,8 @@ from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, PHASE_STATE, SYNC_ERROR
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatorParams
 from tests.bench import Bench
+
+pytestmark = pytest.mark.processes
 
 # With a stiffer spring than the paper's the pair is in step within seconds.
 STIFF = {'k': 60.0, 'initial_phase_percent': 35.0, 'rate': 200.0}
@@ -57,8 +60,10 @@ def test_estimate_is_the_truth_of_the_simulation(bench):
         truth = model.at([t])
         phase = (truth.rotation1[0] - truth.rotation2[0]) / (2 * RigParams().front.alpha) % 1.0
         assert abs(sample.phi.angle / (2 * RigParams().front.alpha) - phase) < 1e-8
-        assert sample.step_difference == truth.steps1[0] - truth.steps2[0] or min(
-            abs(t - s.t) for s in model.strikes) < 1e-6
+        assert (
+            sample.step_difference == truth.steps1[0] - truth.steps2[0]
+            or min(abs(t - s.t) for s in model.strikes) < 1e-6
+        )
 
 
 def test_killed_simulator_is_stale_and_a_new_one_is_judged_afresh(bench):

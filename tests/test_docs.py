@@ -1,6 +1,5 @@
 """The docs say what the code does."""
 
-
 import pytest
 
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file

@@ -16,6 +16,8 @@ from dcdrw_msgs_py.messages import to_stamp
 from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, PHASE_STATE, Topic
 from tests.bench import Bench
 
+pytestmark = pytest.mark.processes
+
 OF_ROS = {'/rosout', '/parameter_events', '/clock'}
 NAMES = [node.name for node in EXECUTABLES]
 
@@ -39,8 +41,9 @@ def test_signals_end_it_cleanly(bench, name, number):
 def test_topics_are_those_of_the_tables(bench: Bench, node: Executable):
     parameters = {'publish_clock': True} if node.name == 'simulator' else {}
     bench.start(node.name, **parameters)
-    declared = tuple({name(topic) for topic in topics if topic not in node.by_choice}
-                     for topics in (node.publishes, node.subscribes))
+    declared = tuple(
+        {name(topic) for topic in topics if topic not in node.by_choice} for topics in (node.publishes, node.subscribes)
+    )
 
     def found():
         graph = bench.node
@@ -49,8 +52,7 @@ def test_topics_are_those_of_the_tables(bench: Bench, node: Executable):
             subscribed = dict(graph.get_subscriber_names_and_types_by_node(node.name, '/'))
         except NodeNameNonExistentError:  # not found yet
             return False
-        return (published.keys() - OF_ROS == declared[0] - OF_ROS
-                and subscribed.keys() - OF_ROS == declared[1] - OF_ROS)
+        return published.keys() - OF_ROS == declared[0] - OF_ROS and subscribed.keys() - OF_ROS == declared[1] - OF_ROS
 
     bench.wait(found, f'{node.name} with {declared}')
 
@@ -62,15 +64,34 @@ def name(topic: Topic) -> str:
 numbers = st.floats(allow_nan=True, allow_infinity=True, width=64)
 messages = st.builds(
     lambda names, positions, velocities, efforts, stamp: (names, positions, velocities, efforts, stamp),
-    st.lists(st.sampled_from(['front_wheel', 'rear_wheel', 'coupler', 'front_stance', 'rear_stance', 'phi',
-                              'step_difference', '', 'x' * 300]), max_size=6),
-    st.lists(numbers, max_size=6), st.lists(numbers, max_size=6), st.lists(numbers, max_size=6),
-    st.integers(0, 2**31 * 10**9 - 1))
+    st.lists(
+        st.sampled_from(
+            [
+                'front_wheel',
+                'rear_wheel',
+                'coupler',
+                'front_stance',
+                'rear_stance',
+                'phi',
+                'step_difference',
+                '',
+                'x' * 300,
+            ]
+        ),
+        max_size=6,
+    ),
+    st.lists(numbers, max_size=6),
+    st.lists(numbers, max_size=6),
+    st.lists(numbers, max_size=6),
+    st.integers(0, 2**31 * 10**9 - 1),
+)
 
 
-@pytest.mark.parametrize(('node', 'topic', 'answer'), [
-    (PHASE_ESTIMATOR, JOINT_STATES, PHASE_STATE), (SYNC_MONITOR, PHASE_STATE, DIAGNOSTICS)],
-    ids=[PHASE_ESTIMATOR.name, SYNC_MONITOR.name])
+@pytest.mark.parametrize(
+    ('node', 'topic', 'answer'),
+    [(PHASE_ESTIMATOR, JOINT_STATES, PHASE_STATE), (SYNC_MONITOR, PHASE_STATE, DIAGNOSTICS)],
+    ids=[PHASE_ESTIMATOR.name, SYNC_MONITOR.name],
+)
 def test_bad_messages_are_survived(bench, node, topic, answer):
     process = bench.start(node.name)
     publisher = bench.publisher(topic)
@@ -100,7 +121,8 @@ def test_bad_messages_are_survived(bench, node, topic, answer):
             message = JointState(
                 name=['front_wheel', 'rear_wheel', 'front_stance', 'rear_stance', 'phi', 'step_difference'],
                 position=[t, t - 0.2, math.remainder(t, math.pi / 6), math.remainder(t - 0.2, math.pi / 6), 0.2, 0.0],
-                velocity=[1.0] * 6)
+                velocity=[1.0] * 6,
+            )
             message.header.stamp = to_stamp(now + k * 10_000_000)
             publisher.publish(message)
         bench.spin(0.1)

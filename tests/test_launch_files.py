@@ -17,9 +17,14 @@ CORE = {'phase_estimator', 'sync_monitor'}
 
 def first_arguments(function: str) -> set[str]:
     """The constants that the composition gives to a function first."""
-    return {call.args[0].value for call in ast.walk(ast.parse(COMPOSITION.read_text(encoding='utf-8')))
-            if isinstance(call, ast.Call) and getattr(call.func, 'id', '') == function
-            and call.args and isinstance(call.args[0], ast.Constant)}
+    return {
+        call.args[0].value
+        for call in ast.walk(ast.parse(COMPOSITION.read_text(encoding='utf-8')))
+        if isinstance(call, ast.Call)
+        and getattr(call.func, 'id', '') == function
+        and call.args
+        and isinstance(call.args[0], ast.Constant)
+    }
 
 
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.name)
@@ -51,9 +56,14 @@ def started():
         context.launch_configurations.update(arguments)
         actions = module['_actions'](context)
         nodes = [action for action in actions if isinstance(action, launch_ros.actions.Node)]
-        return {'nodes': [node.node_executable for node in nodes],
-                'commands': [[launch.utilities.perform_substitutions(context, part) for part in action.cmd[1:]]
-                             for action in actions if action not in nodes]}
+        return {
+            'nodes': [node.node_executable for node in nodes],
+            'commands': [
+                [launch.utilities.perform_substitutions(context, part) for part in action.cmd[1:]]
+                for action in actions
+                if action not in nodes
+            ],
+        }
 
     return start
 

@@ -18,7 +18,10 @@ ALLOWED = {
 KNOW_ROS = {'dcdrw_msgs_py.node', 'dcdrw_msgs_py.messages', 'dcdrw_msgs_py.image_messages', 'dcdrw.nodes.observer'}
 MODULES = [
     '.'.join(path.relative_to(ROOT).with_suffix('').parts)
-    for package in PACKAGES for path in sorted((ROOT / package).rglob('*.py')) if path.stem != '__init__']
+    for package in PACKAGES
+    for path in sorted((ROOT / package).rglob('*.py'))
+    if path.stem != '__init__'
+]
 CORES = [module for module in MODULES if module not in KNOW_ROS and not module.endswith('_node')]
 
 BLOCK_ROS = """
@@ -36,8 +39,13 @@ sys.meta_path.insert(0, Blocked())
 def test_imports_point_one_way(package):
     for path in (ROOT / package).rglob('*.py'):
         for node in ast.walk(ast.parse(path.read_text())):
-            names = ([alias.name for alias in node.names] if isinstance(node, ast.Import)
-                     else [node.module or ''] if isinstance(node, ast.ImportFrom) else [])
+            names = (
+                [alias.name for alias in node.names]
+                if isinstance(node, ast.Import)
+                else [node.module or '']
+                if isinstance(node, ast.ImportFrom)
+                else []
+            )
             for name in names:
                 top = name.split('.')[0]
                 assert top not in PACKAGES or top == package or top in ALLOWED[package], f'{path} imports {name}'
@@ -59,8 +67,14 @@ def test_simulate_runs_without_ros(tmp_path):
 
 def test_trial_without_ros_says_what_to_install(tmp_path):
     code = BLOCK_ROS + 'from dcdrw.cli import main; sys.exit(main(["trial"]))'
-    done = subprocess.run([sys.executable, '-c', code], cwd=tmp_path, capture_output=True, text=True, check=False,
-                          env={'PYTHONPATH': str(ROOT), 'PATH': ''})
+    done = subprocess.run(
+        [sys.executable, '-c', code],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={'PYTHONPATH': str(ROOT), 'PATH': ''},
+    )
     assert done.returncode == 2
     assert done.stderr.startswith('dcdrw trial: a trial needs rclpy:')
     assert not list(tmp_path.iterdir())

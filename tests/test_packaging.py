@@ -17,10 +17,26 @@ from tests import ROOT
 PACKAGES = ('dcdrw_msgs_py', 'dcdrw_sim', 'dcdrw_tracker', 'dcdrw')
 COMMANDS = {'dcdrw', *(node.name for node in EXECUTABLES)}
 # Third-party modules and the package.xml key (rosdep) that brings each.
-KEYS = {'aiohttp': 'python3-aiohttp', 'cv2': 'python3-opencv', 'matplotlib': 'python3-matplotlib',
-        'numpy': 'python3-numpy', 'scipy': 'python3-scipy', 'yaml': 'python3-yaml'}
-OPTIONAL = {'dask', 'distributed', 'netCDF4', 'llvmlite', 'mcap', 'numba', 'pupil_apriltags', 'rosbags', 'tqdm',
-            'xarray'}
+KEYS = {
+    'aiohttp': 'python3-aiohttp',
+    'cv2': 'python3-opencv',
+    'matplotlib': 'python3-matplotlib',
+    'numpy': 'python3-numpy',
+    'scipy': 'python3-scipy',
+    'yaml': 'python3-yaml',
+}
+OPTIONAL = {
+    'dask',
+    'distributed',
+    'netCDF4',
+    'llvmlite',
+    'mcap',
+    'numba',
+    'pupil_apriltags',
+    'rosbags',
+    'tqdm',
+    'xarray',
+}
 
 
 def config() -> ConfigParser:
@@ -74,16 +90,36 @@ def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     source = folder / 'source'
     shutil.copytree(ROOT, source, ignore=shutil.ignore_patterns('.venv*', '.git', 'build', '*.egg-info', 'trials'))
     # --ignore-installed: pip would take away the copy that this environment works with.
-    subprocess.run([sys.executable, '-m', 'pip', 'install', '--quiet', '--ignore-installed', '--no-deps',
-                    '--no-build-isolation', '--prefix', folder / 'prefix', source], check=True, capture_output=True)
+    subprocess.run(
+        [
+            sys.executable,
+            '-m',
+            'pip',
+            'install',
+            '--quiet',
+            '--ignore-installed',
+            '--no-deps',
+            '--no-build-isolation',
+            '--prefix',
+            folder / 'prefix',
+            source,
+        ],
+        check=True,
+        capture_output=True,
+    )
     return folder / 'prefix'
 
 
 def test_pip_installs_what_ros2_run_looks_for(prefix):
     assert {path.name for path in (prefix / 'lib' / 'dcdrw').iterdir() if os.access(path, os.X_OK)} == COMMANDS
     assert (prefix / 'share/ament_index/resource_index/packages/dcdrw').exists()
-    for file in ('package.xml', 'config/rig.yaml', 'config/foxglove_layout.json', 'launch/trial.launch.py',
-                 'rviz/dcdrw.rviz'):
+    for file in (
+        'package.xml',
+        'config/rig.yaml',
+        'config/foxglove_layout.json',
+        'launch/trial.launch.py',
+        'rviz/dcdrw.rviz',
+    ):
         assert (prefix / 'share' / 'dcdrw' / file).exists()
     (site,) = prefix.glob('lib/python3*/site-packages')
     assert {path.name for path in site.iterdir() if not path.name.endswith('-info')} == set(PACKAGES)
@@ -91,7 +127,12 @@ def test_pip_installs_what_ros2_run_looks_for(prefix):
 
 def test_installed_command_runs(prefix):
     (site,) = prefix.glob('lib/python3*/site-packages')
-    done = subprocess.run([sys.executable, prefix / 'lib' / 'dcdrw' / 'dcdrw', '--help'], capture_output=True,
-                          text=True, env={**os.environ, 'PYTHONPATH': str(site)}, check=False)
+    done = subprocess.run(
+        [sys.executable, prefix / 'lib' / 'dcdrw' / 'dcdrw', '--help'],
+        capture_output=True,
+        text=True,
+        env={**os.environ, 'PYTHONPATH': str(site)},
+        check=False,
+    )
     assert done.returncode == 0
     assert 'simulate' in done.stdout

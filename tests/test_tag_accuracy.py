@@ -1,6 +1,5 @@
 """The goals of `benchmarks/tags.py`, but for speed, on short films."""
 
-
 import pytest
 
 pytest.importorskip('cv2')

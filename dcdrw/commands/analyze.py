@@ -18,8 +18,7 @@ from dcdrw.trials.summary import sentence, summarize
 from dcdrw_msgs_py.samples import Footfall
 from dcdrw_msgs_py.topics import JOINT_STATES
 
-SAMPLES_HEADER = ('stamp_ns', 'theta1', 'omega1', 'theta2', 'omega2', 'phi', 'phi_rate', 'step_difference',
-                  'restarts')
+SAMPLES_HEADER = ('stamp_ns', 'theta1', 'omega1', 'theta2', 'omega2', 'phi', 'phi_rate', 'step_difference', 'restarts')
 
 _EPILOG = """\
 A recording is the folder of one, or that of a trial, or an .mcap or .db3 file, by this suite or by ros2 bag record.
@@ -31,23 +30,41 @@ written. Exit status: 0 all were analyzed, 2 one could not be.
 def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        'analyze', help='judge recorded trials', epilog=_EPILOG,
+        'analyze',
+        help='judge recorded trials',
+        epilog=_EPILOG,
         description='Run the estimator and the monitor over recorded joint states, as fast as they go.',
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument('recordings', type=Path, nargs='+', metavar='RECORDING')
-    parser.add_argument('--rig', type=Path, metavar='FILE.yaml',
-                        help="parameters that differ, the joints' names for instance: a ROS 2 parameter file")
-    parser.add_argument('--topic', default=JOINT_STATES.name, metavar='NAME',
-                        help='where the joint states are, in any namespace (default: %(default)s)')
-    parser.add_argument('--out', type=Path, metavar='DIR',
-                        help='write summary, picture, samples and footfalls here, or into a folder for each')
+    parser.add_argument(
+        '--rig',
+        type=Path,
+        metavar='FILE.yaml',
+        help="parameters that differ, the joints' names for instance: a ROS 2 parameter file",
+    )
+    parser.add_argument(
+        '--topic',
+        default=JOINT_STATES.name,
+        metavar='NAME',
+        help='where the joint states are, in any namespace (default: %(default)s)',
+    )
+    parser.add_argument(
+        '--out',
+        type=Path,
+        metavar='DIR',
+        help='write summary, picture, samples and footfalls here, or into a folder for each',
+    )
     parser.set_defaults(run=run, prog='dcdrw analyze')
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
-    folders = [options.out] if len(options.recordings) == 1 else [
-        options.out and options.out / _name(path) for path in options.recordings]
+    folders = (
+        [options.out]
+        if len(options.recordings) == 1
+        else [options.out and options.out / _name(path) for path in options.recordings]
+    )
     for folder in filter(None, folders):
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise ValueError(f'{folder} exists already, not overwriting; choose another --out')
@@ -70,8 +87,9 @@ def _name(path: Path) -> str:
     return path.resolve().stem if path.is_file() else path.resolve().name
 
 
-def read_trial(path: Path, params: TrialParams | None = None, rig: Path | None = None,
-               topic: str = JOINT_STATES.name) -> tuple[Analysis, dict[str, Agreement]]:
+def read_trial(
+    path: Path, params: TrialParams | None = None, rig: Path | None = None, topic: str = JOINT_STATES.name
+) -> tuple[Analysis, dict[str, Agreement]]:
     """Analyze the trial in a recording, and hold the result against what the nodes published then.
 
     Args:

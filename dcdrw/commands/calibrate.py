@@ -36,12 +36,19 @@ does as well. Exit status: 0 calibrated, 2 wrong input or a roll that tells noth
 def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        'calibrate', help='learn downhill, lengths and zeros from a video of one roll', epilog=_EPILOG,
-        description='From a video of one roll to a rig file.', formatter_class=argparse.RawDescriptionHelpFormatter)
+        'calibrate',
+        help='learn downhill, lengths and zeros from a video of one roll',
+        epilog=_EPILOG,
+        description='From a video of one roll to a rig file.',
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     add_film_arguments(parser)
     parser.add_argument('--out', type=Path, required=True, metavar='OUT.yaml', help='the rig file; must not exist')
-    parser.add_argument('--learn-slope', action='store_true',
-                        help='the camera is level as roll_deg says: learn the slope instead of roll_deg')
+    parser.add_argument(
+        '--learn-slope',
+        action='store_true',
+        help='the camera is level as roll_deg says: learn the slope instead of roll_deg',
+    )
     parser.set_defaults(run=run, prog='dcdrw calibrate')
 
 
@@ -95,9 +102,13 @@ def moved(group: TagGroup, wheel: WheelCalibration) -> TagGroup:
     zero = wheel.zero.value
     # Along the slope + 1j along its normal, ψ turns clockwise.
     places = (np.array(group.x) + 1j * np.array(group.y)) * np.exp(1j * zero) + complex(
-        wheel.tag_x.value, wheel.tag_y.value)
-    return group._replace(angles_deg=tuple(angle - math.degrees(zero) for angle in group.angles_deg),
-                          x=tuple(places.real.tolist()), y=tuple(places.imag.tolist()))
+        wheel.tag_x.value, wheel.tag_y.value
+    )
+    return group._replace(
+        angles_deg=tuple(angle - math.degrees(zero) for angle in group.angles_deg),
+        x=tuple(places.real.tolist()),
+        y=tuple(places.imag.tolist()),
+    )
 
 
 class _Line(NamedTuple):
@@ -119,30 +130,51 @@ def _tell(film: Film, found: Calibration, changes: dict[str, Any]) -> None:
     else:
         lines.append(_degrees('roll_deg', math.radians(view.roll_deg), math.radians(changes['roll_deg']), found.turn))
     wheels: tuple[tuple[str, WheelCalibration, WheelShape, TagGroup], ...] = (
-        (FRONT, found.front, track.front, tags.front), (REAR, found.rear, track.rear, tags.rear))
+        (FRONT, found.front, track.front, tags.front),
+        (REAR, found.rear, track.rear, tags.rear),
+    )
     for name, wheel, shape, group in wheels:
         step = 2.0 * math.sin(shape.alpha)
         lines += [
-            _Line(f'{name}: step length σ', 1e3 * shape.step_length, 1e3 * step * wheel.length.value,
-                  1e3 * step * wheel.length.spread, 'mm'),
-            _Line(f'{name}.length', 1e3 * shape.length, 1e3 * wheel.length.value, 1e3 * wheel.length.spread, 'mm')]
+            _Line(
+                f'{name}: step length σ',
+                1e3 * shape.step_length,
+                1e3 * step * wheel.length.value,
+                1e3 * step * wheel.length.spread,
+                'mm',
+            ),
+            _Line(f'{name}.length', 1e3 * shape.length, 1e3 * wheel.length.value, 1e3 * wheel.length.spread, 'mm'),
+        ]
         for i, tag in enumerate(group.ids):
-            for key, spread, scale, unit in (('angles_deg', math.degrees(wheel.zero.spread), 1.0, '°'),
-                                             ('x', 1e3 * wheel.tag_x.spread, 1e3, 'mm'),
-                                             ('y', 1e3 * wheel.tag_y.spread, 1e3, 'mm')):
-                lines.append(_Line(f'{name}.{key}, tag {tag}', scale * getattr(group, key)[i],
-                                   scale * changes[f'{name}.{key}'][i], spread, unit))
+            for key, spread, scale, unit in (
+                ('angles_deg', math.degrees(wheel.zero.spread), 1.0, '°'),
+                ('x', 1e3 * wheel.tag_x.spread, 1e3, 'mm'),
+                ('y', 1e3 * wheel.tag_y.spread, 1e3, 'mm'),
+            ):
+                lines.append(
+                    _Line(
+                        f'{name}.{key}, tag {tag}',
+                        scale * getattr(group, key)[i],
+                        scale * changes[f'{name}.{key}'][i],
+                        spread,
+                        unit,
+                    )
+                )
     print(f'{"":24} {"configured":>12} {"found":>12}')
     for line in lines:
         print(f'{line.what:24} {line.before:12.3f} {line.now:12.3f} ± {line.spread:.3f} {line.unit}')
-    print(f'From {found.front.steps} steps of the front wheel and {found.rear.steps} of the rear one; their hubs are '
-          f'{1e3 * found.front.misfit:.1f} and {1e3 * found.rear.misfit:.1f} mm off the path of a rolling wheel, '
-          'root mean square.')
+    print(
+        f'From {found.front.steps} steps of the front wheel and {found.rear.steps} of the rear one; their hubs are '
+        f'{1e3 * found.front.misfit:.1f} and {1e3 * found.rear.misfit:.1f} mm off the path of a rolling wheel, '
+        'root mean square.'
+    )
     for name, wheel, shape, _ in wheels:
         ratio = wheel.length.value / shape.length
         if abs(ratio - 1.0) > LENGTH_TOLERANCE:
-            print(f'{name}.length is {100.0 * (ratio - 1.0):+.1f} % off what was configured: measure it, or the tags, '
-                  f'whose size should be {1e3 * tags.size / ratio:.1f} mm then')
+            print(
+                f'{name}.length is {100.0 * (ratio - 1.0):+.1f} % off what was configured: measure it, or the tags, '
+                f'whose size should be {1e3 * tags.size / ratio:.1f} mm then'
+            )
 
 
 def _degrees(what: str, before: float, now: float, found: Estimate) -> _Line:

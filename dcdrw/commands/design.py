@@ -73,11 +73,14 @@ class Part(NamedTuple):
 def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        'design', help='choose spring and dashpot for a rig', epilog=_EPILOG,
+        'design',
+        help='choose spring and dashpot for a rig',
+        epilog=_EPILOG,
         description='Find the coupler that synchronizes a rig fastest, and the one that forgives most.',
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     add_rig_options(parser)
-    rig = parser.add_argument_group('the rig, in place of the preset\'s or the file\'s')
+    rig = parser.add_argument_group("the rig, in place of the preset's or the file's")
     rig.add_argument('--mass', type=positive, metavar='KG', help='of each wheel')
     rig.add_argument('--length', type=positive, metavar='M', help='of each wheel, hub to foot')
     rig.add_argument('--spokes', type=count, metavar='N', help='of each wheel')
@@ -89,10 +92,20 @@ def add_command(commands: Any) -> None:
     coupler.add_argument('--available', type=Path, metavar='PARTS.csv', help='choose among these parts')
     coupler.add_argument('--k', type=positive, metavar='N/m', help='judge this one, too; with --b')
     coupler.add_argument('--b', type=positive, metavar='N·s/m')
-    coupler.add_argument('--tolerance', type=positive, default=100.0 * TOLERANCE, metavar='PERCENT',
-                         help='what k and b may be off by (default: %(default)g)')
-    parser.add_argument('--band', type=positive, default=SyncParams().band_percent, metavar='PERCENT',
-                        help='in step is within ± this of 50 %% (default: %(default)g, the monitor\'s)')
+    coupler.add_argument(
+        '--tolerance',
+        type=positive,
+        default=100.0 * TOLERANCE,
+        metavar='PERCENT',
+        help='what k and b may be off by (default: %(default)g)',
+    )
+    parser.add_argument(
+        '--band',
+        type=positive,
+        default=SyncParams().band_percent,
+        metavar='PERCENT',
+        help="in step is within ± this of 50 %% (default: %(default)g, the monitor's)",
+    )
     parser.add_argument('--out', type=Path, metavar='DIR', help='write card.pdf, card.png and design.json there')
     parser.set_defaults(run=run, prog='dcdrw design')
 
@@ -125,8 +138,9 @@ def run(options: argparse.Namespace) -> int:
         content = json.dumps(record(task, chosen, parts, tolerance), indent=1, ensure_ascii=False)
         (options.out / 'design.json').write_text(content + '\n', encoding='utf-8')
         for name in ('card.pdf', 'card.png'):
-            draw_card(_rig_line(task), _texts(task, chosen, parts, tolerance), task, grid, chosen, parts,
-                      options.out / name)
+            draw_card(
+                _rig_line(task), _texts(task, chosen, parts, tolerance), task, grid, chosen, parts, options.out / name
+            )
         print(f'\nThe card and all numbers are in {options.out}.')
     return 0
 
@@ -191,8 +205,13 @@ def _bounds(options: argparse.Namespace, rig: RigParams) -> Iterator[tuple[float
 
 
 def _best_parts(task: Task, parts: list[Part], tolerance: float, progress: '_Progress') -> list[tuple[float, float]]:
-    ks, bs = (np.array(column) for column in zip(*product(
-        (part.value for part in _of(parts, 'spring')), (part.value for part in _of(parts, 'dashpot'))), strict=True))
+    ks, bs = (
+        np.array(column)
+        for column in zip(
+            *product((part.value for part in _of(parts, 'spring')), (part.value for part in _of(parts, 'dashpot'))),
+            strict=True,
+        )
+    )
     first = score(task, ks, bs, report=progress.among(len(ks))).order()[0]
     near = forgiving_order(task, ks, bs, tolerance, progress.among(len(ks) * CASES))[0]
     return [(float(ks[index]), float(bs[index])) for index in (first, near)]
@@ -216,27 +235,55 @@ def told(task: Task, found: Assessment, tolerance: float) -> Iterator[tuple[str,
         yield 'steps', f'{settling} of {len(found.steps)} starts come into step; the worst: {found.verdict.meaning}'
     else:
         yield 'steps', f'{found.worst_steps:.0f} from the worst start, {found.time:.1f} s'
-    yield 'from each', ' '.join(f'{100 * phase:.0f} %: {_number(steps)}' for phase, steps in
-                                zip(task.phases, found.steps, strict=True))
+    yield (
+        'from each',
+        ' '.join(
+            f'{100 * phase:.0f} %: {_number(steps)}' for phase, steps in zip(task.phases, found.steps, strict=True)
+        ),
+    )
     if not math.isnan(found.multiplier):
-        yield 'limit cycle', (f'{50.0 - _percent_of(task, found.cycle_theta2):.1f} % at {found.speed:.3f} m/s; '
-                              f'a step leaves {100 * found.multiplier:.1f} % of a small error; '
-                              f'the damper takes {found.damper_loss:.2f} J/m')
+        yield (
+            'limit cycle',
+            (
+                f'{50.0 - _percent_of(task, found.cycle_theta2):.1f} % at {found.speed:.3f} m/s; '
+                f'a step leaves {100 * found.multiplier:.1f} % of a small error; '
+                f'the damper takes {found.damper_loss:.2f} J/m'
+            ),
+        )
     yield 'margins', '; '.join(f'{name} {_margin(margin)}' for name, margin in found.margins.items())
     slope = found.margins['slope']
-    yield 'gentlest slope', (f'{math.degrees(slope.low * task.rig.slope):.2f}°'
-                             + (f'; on a gentler one: {slope.low_verdict.meaning}' if slope.low_verdict else ''))
+    yield (
+        'gentlest slope',
+        (
+            f'{math.degrees(slope.low * task.rig.slope):.2f}°'
+            + (f'; on a gentler one: {slope.low_verdict.meaning}' if slope.low_verdict else '')
+        ),
+    )
     off = f'{100 * tolerance:.0f} %'
     by_name = {(variation.parameter, variation.factor < 1.0): variation for variation in found.sensitivity}
-    yield f'if {off} off', '; '.join(
-        f'{name} less: {_outcome(by_name[name, True])}, more: {_outcome(by_name[name, False])}' for name in VARIED)
+    yield (
+        f'if {off} off',
+        '; '.join(
+            f'{name} less: {_outcome(by_name[name, True])}, more: {_outcome(by_name[name, False])}' for name in VARIED
+        ),
+    )
 
 
 def _texts(task: Task, chosen: dict[str, Assessment], parts: list[Part], tolerance: float) -> dict[str, str]:
     """The card's words."""
-    return {name: '\n'.join([f'{name.upper()}   {_coupler(task, found, parts)}', *(
-        f'{heading}: {content}' for heading, content in told(task, found, tolerance) if heading != 'from each')])
-        for name, found in chosen.items()}
+    return {
+        name: '\n'.join(
+            [
+                f'{name.upper()}   {_coupler(task, found, parts)}',
+                *(
+                    f'{heading}: {content}'
+                    for heading, content in told(task, found, tolerance)
+                    if heading != 'from each'
+                ),
+            ]
+        )
+        for name, found in chosen.items()
+    }
 
 
 def record(task: Task, chosen: dict[str, Assessment], parts: list[Part], tolerance: float) -> dict[str, Any]:
@@ -244,27 +291,54 @@ def record(task: Task, chosen: dict[str, Assessment], parts: list[Part], toleran
     scales = nondimensional(task.rig)[1]
     return {
         'parameters': {name: value for name, value in flatten(task.rig.resolved()).items() if name not in ('k', 'b')},
-        'task': {'seconds': task.seconds, 'band_percent': _percent_of(task, task.band), 'tolerance': tolerance,
-                 'starts_percent': [100.0 * phase for phase in task.phases]},
-        'couplers': {name.replace(' ', '_'): {
-            'k': found.k, 'b': found.b, 'k_nondimensional': found.k / scales.stiffness,
-            'b_nondimensional': found.b / scales.damping,
-            **({'spring': _named(parts, 'spring', found.k), 'dashpot': _named(parts, 'dashpot', found.b)}
-               if parts and name != GIVEN else {}),
-            'verdict': found.verdict.name.lower(), 'worst_steps': _known(found.worst_steps),
-            'worst_time': _known(found.time), 'steps': [_known(steps) for steps in found.steps],
-            'phase_percent': _known(50.0 - _percent_of(task, found.cycle_theta2)),
-            'multiplier': _known(found.multiplier), 'speed': _known(found.speed),
-            'damper_loss': _known(found.damper_loss),
-            'margins': {name: {
-                'low': margin.low, 'high': margin.high,
-                **{f'{side}_verdict': verdict and verdict.name.lower()
-                   for side, verdict in (('low', margin.low_verdict), ('high', margin.high_verdict))},
-            } for name, margin in found.margins.items()},
-            'sensitivity': [{'parameter': variation.parameter, 'factor': variation.factor,
-                             'verdict': variation.verdict.name.lower(), 'worst_steps': _known(variation.steps)}
-                            for variation in found.sensitivity],
-        } for name, found in chosen.items()},
+        'task': {
+            'seconds': task.seconds,
+            'band_percent': _percent_of(task, task.band),
+            'tolerance': tolerance,
+            'starts_percent': [100.0 * phase for phase in task.phases],
+        },
+        'couplers': {
+            name.replace(' ', '_'): {
+                'k': found.k,
+                'b': found.b,
+                'k_nondimensional': found.k / scales.stiffness,
+                'b_nondimensional': found.b / scales.damping,
+                **(
+                    {'spring': _named(parts, 'spring', found.k), 'dashpot': _named(parts, 'dashpot', found.b)}
+                    if parts and name != GIVEN
+                    else {}
+                ),
+                'verdict': found.verdict.name.lower(),
+                'worst_steps': _known(found.worst_steps),
+                'worst_time': _known(found.time),
+                'steps': [_known(steps) for steps in found.steps],
+                'phase_percent': _known(50.0 - _percent_of(task, found.cycle_theta2)),
+                'multiplier': _known(found.multiplier),
+                'speed': _known(found.speed),
+                'damper_loss': _known(found.damper_loss),
+                'margins': {
+                    name: {
+                        'low': margin.low,
+                        'high': margin.high,
+                        **{
+                            f'{side}_verdict': verdict and verdict.name.lower()
+                            for side, verdict in (('low', margin.low_verdict), ('high', margin.high_verdict))
+                        },
+                    }
+                    for name, margin in found.margins.items()
+                },
+                'sensitivity': [
+                    {
+                        'parameter': variation.parameter,
+                        'factor': variation.factor,
+                        'verdict': variation.verdict.name.lower(),
+                        'worst_steps': _known(variation.steps),
+                    }
+                    for variation in found.sensitivity
+                ],
+            }
+            for name, found in chosen.items()
+        },
     }
 
 
@@ -272,15 +346,18 @@ def _rig_line(task: Task) -> str:
     rig = task.rig
     same = rig.front == rig.rear
     wheels = [f'{wheel.length:g} m, {wheel.mass:g} kg, {wheel.spokes:g} spokes' for wheel in (rig.front, rig.rear)]
-    return (f'Two wheels of {wheels[0]}' if same else f'A front wheel of {wheels[0]}, a rear one of {wheels[1]}'
-            ) + f', on {math.degrees(rig.slope):.3g}°.'
+    return (
+        f'Two wheels of {wheels[0]}' if same else f'A front wheel of {wheels[0]}, a rear one of {wheels[1]}'
+    ) + f', on {math.degrees(rig.slope):.3g}°.'
 
 
 def _coupler(task: Task, found: Assessment, parts: list[Part]) -> str:
     names = ', '.join(filter(None, (_named(parts, 'spring', found.k), _named(parts, 'dashpot', found.b))))
     scales = nondimensional(task.rig)[1]
-    return (f'k = {found.k:.4g} N/m, b = {found.b:.4g} N·s/m   (k̂ = {found.k / scales.stiffness:.3g}, '
-            f'b̂ = {found.b / scales.damping:.3g})' + (f'   {names}' if names else ''))
+    return (
+        f'k = {found.k:.4g} N/m, b = {found.b:.4g} N·s/m   (k̂ = {found.k / scales.stiffness:.3g}, '
+        f'b̂ = {found.b / scales.damping:.3g})' + (f'   {names}' if names else '')
+    )
 
 
 def _named(parts: list[Part], kind: str, value: float) -> str:

@@ -72,12 +72,16 @@ def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     listed = ''.join(f'  {name:<14}{(draw.__doc__ or "").splitlines()[0]}\n' for name, draw in FIGURES.items())
     parser = commands.add_parser(
-        'figures', help="the paper's simulated figures, and what explains them", epilog=_EPILOG.format(figures=listed),
+        'figures',
+        help="the paper's simulated figures, and what explains them",
+        epilog=_EPILOG.format(figures=listed),
         description='Draw every simulated figure of the paper, its method mended, from sweeps that are kept.',
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument('--out', type=Path, required=True, metavar='DIR', help='where to put them')
-    parser.add_argument('--only', nargs='+', choices=FIGURES, metavar='NAME', default=list(FIGURES),
-                        help='some of them only')
+    parser.add_argument(
+        '--only', nargs='+', choices=FIGURES, metavar='NAME', default=list(FIGURES), help='some of them only'
+    )
     parser.add_argument('--format', choices=('png', 'pdf', 'svg'), default='png', help='(default: %(default)s)')
     parser.add_argument('--quick', action='store_true', help='coarse sweeps: to look, not to print')
     parser.add_argument('--cache', type=Path, metavar='DIR', help='where to keep sweeps (default: ~/.cache/dcdrw)')
@@ -109,6 +113,7 @@ def _trajectories(book: Book) -> Any:
 def _eigenvalues(book: Book) -> Any:
     """Couplers that converge, with the largest eigenvalue: the paper's way, mended, and exact."""
     from matplotlib.colors import Normalize
+
     figure = new_figure(12, 8.4)
     rows = (('paper', PAPERS_SWEEP, 'D0 = S0 + ℓ sin α'), ('preloaded', PRELOADED, 'D0 = S0'))
     for line, (name, rig, title) in zip(figure.subplots(2, 3, sharex=True, sharey=True), rows, strict=True):
@@ -145,8 +150,10 @@ def _regimes(book: Book) -> Any:
     """What becomes of a pair over stiffness and damping, and over slope and damping."""
     figure = new_figure(14, 6.4)
     coupler, preloaded, slope = figure.subplots(1, 3)
-    for axes, name, rig, title in ((coupler, 'paper-long', PAPERS_SWEEP, 'D0 = S0 + ℓ sin α: at rest at φ = α'),
-                                   (preloaded, 'preloaded-long', PRELOADED, 'D0 = S0: preloaded')):
+    for axes, name, rig, title in (
+        (coupler, 'paper-long', PAPERS_SWEEP, 'D0 = S0 + ℓ sin α: at rest at φ = α'),
+        (preloaded, 'preloaded-long', PRELOADED, 'D0 = S0: preloaded'),
+    ):
         sweep = _paper(book, LONG_POINTS)._replace(rig=rig, seconds=LONG, trajectories=False)
         with book.sweep(name, sweep) as dataset:
             regime_figures.draw_coupler_regimes(axes, dataset, papers_sweep().seconds)
@@ -154,7 +161,10 @@ def _regimes(book: Book) -> Any:
     points = book.points(LONG_POINTS)
     sweep = papers_sweep()._replace(
         x=Axis('slope_deg', tuple(np.linspace(*SLOPES, points).tolist())),
-        y=Axis('b', tuple(np.geomspace(*DAMPINGS, points).tolist())), seconds=LONG, trajectories=False)
+        y=Axis('b', tuple(np.geomspace(*DAMPINGS, points).tolist())),
+        seconds=LONG,
+        trajectories=False,
+    )
     with book.sweep('slopes', sweep) as dataset:
         regime_figures.draw_slope_regimes(slope, dataset)
     slope.set_title(f'k̂ = {PAPERS_SWEEP.k:g}', fontsize=10)
@@ -190,8 +200,14 @@ def _pair(book: Book) -> Any:
 
 
 FIGURES: dict[str, Callable[[Book], Any]] = {
-    'trajectories': _trajectories, 'eigenvalues': _eigenvalues, 'best': _best, 'experiment': _experiment,
-    'regimes': _regimes, 'basin': _basin, 'pair': _pair}
+    'trajectories': _trajectories,
+    'eigenvalues': _eigenvalues,
+    'best': _best,
+    'experiment': _experiment,
+    'regimes': _regimes,
+    'basin': _basin,
+    'pair': _pair,
+}
 
 
 def _paper(book: Book, points: int = POINTS) -> Sweep:

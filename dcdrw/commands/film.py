@@ -64,24 +64,35 @@ class Files(NamedTuple):
     @classmethod
     def of(cls, video: Path) -> 'Files':
         """The files that stand beside a video."""
-        return cls(video, *(video.with_suffix(end) for end in (
-            '.csv', '.strikes.csv', '.camera.yaml', '.rig.yaml', '.stamps.csv')))
+        return cls(
+            video,
+            *(video.with_suffix(end) for end in ('.csv', '.strikes.csv', '.camera.yaml', '.rig.yaml', '.stamps.csv')),
+        )
 
 
 def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        'film', help='film a simulated trial, with its ground truth', epilog=_EPILOG,
-        description='Render a simulated trial to a video, as a camera on the rig\'s left sees it.',
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+        'film',
+        help='film a simulated trial, with its ground truth',
+        epilog=_EPILOG,
+        description="Render a simulated trial to a video, as a camera on the rig's left sees it.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument('--out', type=Path, required=True, metavar='FILE.mp4', help='the video; must not exist')
     add_rig_options(parser)
-    parser.add_argument('--initial-phase', type=number, metavar='PERCENT',
-                        help='phase at the start, percent of a step (default: 21.6)')
+    parser.add_argument(
+        '--initial-phase', type=number, metavar='PERCENT', help='phase at the start, percent of a step (default: 21.6)'
+    )
     parser.add_argument('--seconds', type=positive, default=30.0, help='length of the film (default: %(default)g)')
     parser.add_argument('--fps', type=positive, default=60.0, help='frames per second (default: %(default)g)')
-    parser.add_argument('--drop', type=number, default=0.0, metavar='PERCENT',
-                        help='frames that are lost at random, by the seed of the image noise (default: none)')
+    parser.add_argument(
+        '--drop',
+        type=number,
+        default=0.0,
+        metavar='PERCENT',
+        help='frames that are lost at random, by the seed of the image noise (default: none)',
+    )
     parser.add_argument('--grey', action='store_true', help='film in grey')
     parser.add_argument('--quiet', action='store_true', help='no live progress')
     for title, params in (('the camera and its tripod', ViewParams), ('the picture', LookParams)):
@@ -100,8 +111,12 @@ def _add_option(group: Any, field: Field) -> None:
     if field.kind is bool:
         group.add_argument(option, action=argparse.BooleanOptionalAction, **about)
     else:
-        group.add_argument(option, type={int: int, float: number, str: str}[field.kind],
-                           metavar=field.name.rsplit('_', 1)[-1].upper(), **about)
+        group.add_argument(
+            option,
+            type={int: int, float: number, str: str}[field.kind],
+            metavar=field.name.rsplit('_', 1)[-1].upper(),
+            **about,
+        )
 
 
 def film(options: argparse.Namespace) -> int:
@@ -155,8 +170,10 @@ def film(options: argparse.Namespace) -> int:
             written += 1
         progress.end()
     end = f'; ended at {shots.simulation.time:.3f} s: {trouble}' if trouble else '; interrupted' if interrupted else ''
-    print(f'{written} frames, {written / options.fps:.1f} s of video{end}. Written: {files.video}, and beside it '
-          f'{", ".join(file.name for file in files[1:] if file.exists())}')
+    print(
+        f'{written} frames, {written / options.fps:.1f} s of video{end}. Written: {files.video}, and beside it '
+        f'{", ".join(file.name for file in files[1:] if file.exists())}'
+    )
     return 130 if interrupted else 1 if trouble else 0
 
 
@@ -175,8 +192,7 @@ def _params(options: argparse.Namespace) -> FilmParams:
 
 
 def _with_options(params: Params, options: argparse.Namespace) -> Params:
-    given = {field.name: value for field in fields(type(params))
-             if (value := getattr(options, field.name)) is not None}
+    given = {field.name: value for field in fields(type(params)) if (value := getattr(options, field.name)) is not None}
     return build(type(params), flatten(params) | given)
 
 
@@ -197,8 +213,11 @@ class Shots:
         """
         motion = self.simulation.advance_to(t)
         return motion, JointSample(
-            round(t * SECOND), Turn(motion.rotation1, motion.omega1), Turn(motion.rotation2, motion.omega2),
-            CouplerSample(motion.length, motion.rate, motion.force))
+            round(t * SECOND),
+            Turn(motion.rotation1, motion.omega1),
+            Turn(motion.rotation2, motion.omega2),
+            CouplerSample(motion.length, motion.rate, motion.force),
+        )
 
     def strikes(self, motion: Motion) -> Iterator[tuple[str, int, float, int]]:
         """Rows of the strikes up to a motion since the last one (`STRIKES`)."""
@@ -207,8 +226,12 @@ class Shots:
             i = strike.wheel - 1
             self._steps[i] += strike.direction
             start, wheel = ((self._start, rig.front), (0.0, rig.rear))[i]
-            yield ((FRONT, REAR)[i], round(strike.t * SECOND), start + self._steps[i] * wheel.step_length,
-                   self._steps[i])
+            yield (
+                (FRONT, REAR)[i],
+                round(strike.t * SECOND),
+                start + self._steps[i] * wheel.step_length,
+                self._steps[i],
+            )
 
     def truth(self, joints: JointSample) -> tuple[float, ...]:
         """The row of a frame (`TRUTH`), the simulation being there."""
@@ -232,8 +255,10 @@ def open_video(path: Path, fps: float, size: tuple[int, int], colour: bool) -> A
     if not video.isOpened():
         path.unlink(missing_ok=True)
         others = ', '.join(f'{end} ({name})' for end, name in CODECS.items() if end != path.suffix)
-        raise ValueError(f'this OpenCV ({cv2.__version__}) does not write {codec} into {path}; try another ending, '
-                         f'{others}, or pip install opencv-python-headless')
+        raise ValueError(
+            f'this OpenCV ({cv2.__version__}) does not write {codec} into {path}; try another ending, '
+            f'{others}, or pip install opencv-python-headless'
+        )
     return video
 
 
@@ -245,7 +270,11 @@ def _table(stack: ExitStack, path: Path, columns: tuple[str, ...]) -> Any:
 
 def _write_rig(path: Path, params: FilmParams) -> None:
     """Write rig, tags and how the camera stands for every node; derived defaults are left to the nodes."""
-    values = {**given(params.rig), **given(params.tags), 'camera_follows': params.view.follow,
-              'roll_deg': params.view.roll_deg}
+    values = {
+        **given(params.rig),
+        **given(params.tags),
+        'camera_follows': params.view.follow,
+        'roll_deg': params.view.roll_deg,
+    }
     content = {'/**': {'ros__parameters': values}}
     path.write_text(yaml.safe_dump(content, sort_keys=False, allow_unicode=True), encoding='utf-8')

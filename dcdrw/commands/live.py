@@ -36,12 +36,18 @@ rig file tells what they do not, and is what --trial starts with. Ctrl-C ends.
 def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        'live', help='watch a running suite in the browser', epilog=_EPILOG,
+        'live',
+        help='watch a running suite in the browser',
+        epilog=_EPILOG,
         description='Serve a page with the wheels, the phase, the error of each step and the health of the nodes.',
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     add_rig_options(parser)
-    parser.add_argument('--trial', action='store_true',
-                        help='start simulator, phase estimator, monitor and recorder, too, on a free ROS domain')
+    parser.add_argument(
+        '--trial',
+        action='store_true',
+        help='start simulator, phase estimator, monitor and recorder, too, on a free ROS domain',
+    )
     parser.add_argument('--namespace', type=_namespace, default='', metavar='NAME', help='where the nodes are')
     parser.add_argument('--domain', type=domain, metavar='N', help='ROS domain (default: as ROS_DOMAIN_ID says)')
     parser.add_argument('--port', type=_port, default=PORT, metavar='N', help='0: any free one (default: %(default)s)')
@@ -53,14 +59,17 @@ def add_command(commands: Any) -> None:
 
 def live(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
-    for module, mend in (('rclpy', "source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' "
-                                   'ros-jazzy-common-interfaces'), ('aiohttp', 'pip install aiohttp')):
+    for module, mend in (
+        ('rclpy', "source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces"),
+        ('aiohttp', 'pip install aiohttp'),
+    ):
         try:
             import_module(module)
         except ImportError:
             raise ValueError(f'the live page needs {module}: {mend}') from None
     from dcdrw.page.live_page import PageServer, is_loopback, listen_at
     from dcdrw_msgs_py.node import SPIN_SECONDS
+
     params = chosen_params(options)
     token = secrets.token_urlsafe(16) if options.token == AUTO else options.token or ''
     if token and len(token) < SHORTEST_TOKEN:
@@ -94,14 +103,16 @@ def live(options: argparse.Namespace) -> int:
     return 0
 
 
-def _listener(params: TrialParams, namespace: str, server: Any, commands: 'SimpleQueue[Command]', held: bool,
-              stack: ExitStack) -> Any:
+def _listener(
+    params: TrialParams, namespace: str, server: Any, commands: 'SimpleQueue[Command]', held: bool, stack: ExitStack
+) -> Any:
     """The executor of the node that listens."""
     import rclpy
     from rclpy.signals import SignalHandlerOptions
 
     from dcdrw.nodes.live_node import LiveNode
     from dcdrw_msgs_py.node import make_executor
+
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     stack.callback(rclpy.try_shutdown)
     node = LiveNode(params, server.show, commands, held, namespace=namespace)
@@ -123,8 +134,9 @@ def _environment(options: argparse.Namespace, stack: ExitStack) -> dict[str, str
     return {}
 
 
-def _start_nodes(params: TrialParams, namespace: str, environment: dict[str, str],
-                 stack: ExitStack) -> list[NodeProcess]:
+def _start_nodes(
+    params: TrialParams, namespace: str, environment: dict[str, str], stack: ExitStack
+) -> list[NodeProcess]:
     folder = Path(tempfile.mkdtemp(prefix='dcdrw-live-'))
     stack.callback(shutil.rmtree, folder, ignore_errors=True)
     file = folder / 'parameters.yaml'
@@ -132,8 +144,10 @@ def _start_nodes(params: TrialParams, namespace: str, environment: dict[str, str
     arguments = ['--ros-args', '--params-file', str(file)]
     if namespace:
         arguments += ['-r', f'__ns:=/{namespace}']
-    nodes = [NodeProcess(node.name, node.module, arguments, environment, folder / f'{node.name}.log')
-             for node in (RECORDER, *reversed(TRIAL))]  # who listens, first
+    nodes = [
+        NodeProcess(node.name, node.module, arguments, environment, folder / f'{node.name}.log')
+        for node in (RECORDER, *reversed(TRIAL))
+    ]  # who listens, first
 
     def stop() -> None:
         for node in nodes:

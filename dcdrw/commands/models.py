@@ -34,9 +34,12 @@ footfalls.png (gait diagrams). models.json holds the numbers, in SI units and ra
 def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        'models', help='the single wheel and the rigidly coupled pair, to compare with', epilog=_EPILOG,
+        'models',
+        help='the single wheel and the rigidly coupled pair, to compare with',
+        epilog=_EPILOG,
         description='Tell what the models that the coupled pair builds on do on its slope.',
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     add_rig_options(parser)
     parser.add_argument('--out', type=Path, metavar='DIR', help='draw the pictures and write models.json there, too')
     parser.set_defaults(run=run, prog='dcdrw models')
@@ -70,8 +73,9 @@ def record(rig: RigParams) -> dict[str, Any]:
         'wheels': {name: _wheel(wheel, rig) for name, wheel in ((FRONT, rig.front), (REAR, rig.rear))},
         'rigid_pair': _told(_rigid_pair, rig),
         'coupled_pair': _told(_coupled_pair, rig),
-        'footfalls': [{'phase': phase, 'order': order(steady_contacts(phase)), 'rear_lead': rear_lead(phase)}
-                      for phase in GAITS],
+        'footfalls': [
+            {'phase': phase, 'order': order(steady_contacts(phase)), 'rear_lead': rear_lead(phase)} for phase in GAITS
+        ],
     }
 
 
@@ -119,8 +123,11 @@ def _rigid_gait(rig: RigParams, phase: float, velocity: float) -> dict[str, Any]
     slope = math.nan if math.isnan(velocity) else rigid_pair.slope_for_velocity(rig, phase, velocity)
     feet = [impulse for impact in pair.impacts() for impulse in (impact.front_foot, impact.rear_foot)] if rolls else []
     return {
-        'phase': phase, 'velocity': _known(gait.velocity), 'period': _known(gait.period),
-        'multiplier': pair.multiplier, 'gentlest_slope': _known(rigid_pair.gentlest_slope(rig, phase)),
+        'phase': phase,
+        'velocity': _known(gait.velocity),
+        'period': _known(gait.period),
+        'multiplier': pair.multiplier,
+        'gentlest_slope': _known(rigid_pair.gentlest_slope(rig, phase)),
         'slope_at_velocity_of_50_percent': _known(slope),
         'energy_per_metre_at_velocity_of_50_percent': _known(rigid_pair.energy_per_metre(rig._replace(slope=slope))),
         'pull': max(0.0, -min(feet) / max(feet)) if feet else None,
@@ -130,8 +137,12 @@ def _rigid_gait(rig: RigParams, phase: float, velocity: float) -> dict[str, Any]
 def _coupled_pair(rig: RigParams) -> dict[str, Any]:
     return_map = ReturnMap(rig)
     fixed = return_map.fixed_point()
-    return {'phase': float(return_map.phase(fixed.state)), 'period': fixed.period,
-            'velocity': rig.front.step_length / fixed.period, 'stable': fixed.stable}
+    return {
+        'phase': float(return_map.phase(fixed.state)),
+        'period': fixed.period,
+        'velocity': rig.front.step_length / fixed.period,
+        'stable': fixed.stable,
+    }
 
 
 def report(found: dict[str, Any]) -> Iterator[str]:
@@ -145,13 +156,19 @@ def report(found: dict[str, Any]) -> Iterator[str]:
     yield from _pair_lines(found['rigid_pair'])
     coupled = found['coupled_pair']
     yield 'coupled pair, to compare'
-    yield (f'  none: {coupled["trouble"]}' if 'trouble' in coupled else
-           f'  settles at {100 * coupled["phase"]:.1f} %, {coupled["velocity"]:.4f} m/s'
-           if coupled['stable'] else f'  its gait at {100 * coupled["phase"]:.1f} % is not stable')
+    yield (
+        f'  none: {coupled["trouble"]}'
+        if 'trouble' in coupled
+        else f'  settles at {100 * coupled["phase"]:.1f} %, {coupled["velocity"]:.4f} m/s'
+        if coupled['stable']
+        else f'  its gait at {100 * coupled["phase"]:.1f} % is not stable'
+    )
     yield 'footfalls, 1 front left, 2 front right, 3 rear left, 4 rear right'
     for gait in found['footfalls']:
-        yield (f'  {100 * gait["phase"]:3.0f} %   {gait["order"]}   a rear foot leads the front one of its side by '
-               f'{100 * gait["rear_lead"]:.1f} % of a stride')
+        yield (
+            f'  {100 * gait["phase"]:3.0f} %   {gait["order"]}   a rear foot leads the front one of its side by '
+            f'{100 * gait["rear_lead"]:.1f} % of a stride'
+        )
 
 
 def _wheel_lines(heading: str, wheel: dict[str, Any], slope: float) -> Iterator[str]:
@@ -159,13 +176,17 @@ def _wheel_lines(heading: str, wheel: dict[str, Any], slope: float) -> Iterator[
     if wheel['velocity'] is None:
         yield f'  limit cycle   none on {math.degrees(slope):.4g}°'
     else:
-        yield (f'  limit cycle   {wheel["velocity"]:.4f} m/s, a step in {wheel["period"]:.4f} s; '
-               f'{wheel["omega_after_strike"]:.4f} rad/s after a strike, {wheel["omega_before_strike"]:.4f} before')
+        yield (
+            f'  limit cycle   {wheel["velocity"]:.4f} m/s, a step in {wheel["period"]:.4f} s; '
+            f'{wheel["omega_after_strike"]:.4f} rad/s after a strike, {wheel["omega_before_strike"]:.4f} before'
+        )
         yield f'  loses         {wheel["energy_per_metre"]:.4g} J/m at strikes'
     yield f'  multiplier    {wheel["multiplier"]:.4f}, cos² 2α: left of a deviation after a step'
-    yield (f'  slopes        above {math.degrees(wheel["gentlest_slope"]):.4g}° it rolls, from '
-           f'{math.degrees(wheel["slope_without_standing"]):.4g}° on it cannot stand; from '
-           f'{math.degrees(wheel["slope_of_lift_off"]):.4g}° on a real foot would lift off')
+    yield (
+        f'  slopes        above {math.degrees(wheel["gentlest_slope"]):.4g}° it rolls, from '
+        f'{math.degrees(wheel["slope_without_standing"]):.4g}° on it cannot stand; from '
+        f'{math.degrees(wheel["slope_of_lift_off"]):.4g}° on a real foot would lift off'
+    )
     if slope < wheel['slope_without_standing']:
         yield f'  passes apex   above {wheel["omega_to_pass"]:.4f} rad/s after a strike, else it comes to stand'
         if wheel['uphill_bands']:
@@ -184,11 +205,13 @@ def _pair_lines(pair: dict[str, Any]) -> Iterator[str]:
     yield '  [%]       [m/s]   [s]    per step  [°]      [°]      [J/m]     [%]'
     for gait in pair['phases']:
         phase = {0.0: '0 at once', NEAR_TOGETHER: '0 in turn'}.get(gait['phase'], f'{100 * gait["phase"]:.0f}')
-        yield (f'  {phase:<10}{_number(gait["velocity"], 4):<8}{_number(gait["period"], 4):<7}'
-               f'{_number(gait["multiplier"], 4):<10}{_degrees(gait["gentlest_slope"]):<9}'
-               f'{_degrees(gait["slope_at_velocity_of_50_percent"]):<9}'
-               f'{_number(gait["energy_per_metre_at_velocity_of_50_percent"], 3):<10}'
-               f'{_number(None if gait["pull"] is None else 100 * gait["pull"], 1)}').rstrip()
+        yield (
+            f'  {phase:<10}{_number(gait["velocity"], 4):<8}{_number(gait["period"], 4):<7}'
+            f'{_number(gait["multiplier"], 4):<10}{_degrees(gait["gentlest_slope"]):<9}'
+            f'{_degrees(gait["slope_at_velocity_of_50_percent"]):<9}'
+            f'{_number(gait["energy_per_metre_at_velocity_of_50_percent"], 3):<10}'
+            f'{_number(None if gait["pull"] is None else 100 * gait["pull"], 1)}'
+        ).rstrip()
     if fastest := pair.get('fastest'):
         yield f'  fastest at {100 * fastest["phase"]:.2f} %: {fastest["velocity"]:.4f} m/s'
 
@@ -202,8 +225,9 @@ def draw(rig: RigParams, found: dict[str, Any], folder: Path) -> None:
     """
     wheels = {FRONT: rig.front} if rig.front == rig.rear else {FRONT: rig.front, REAR: rig.rear}
     figure = new_figure(11, 5 * len(wheels))
-    for (name, wheel), (basin, speed) in zip(wheels.items(), figure.subplots(len(wheels), 2, squeeze=False),
-                                             strict=True):
+    for (name, wheel), (basin, speed) in zip(
+        wheels.items(), figure.subplots(len(wheels), 2, squeeze=False), strict=True
+    ):
         model_figures.draw_basin(basin, wheel, rig.slope, rig.gravity)
         model_figures.draw_wheel_speed(speed, wheel, rig.slope, rig.gravity)
         speed.set_title('a single wheel' if len(wheels) == 1 else f'the {name} wheel by itself')

@@ -19,14 +19,22 @@ Ctrl-C ends it; a kill costs a second at most. Exit status: 0 ended by Ctrl-C, 1
 def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        'record', help='record a running suite', epilog=_EPILOG,
+        'record',
+        help='record a running suite',
+        epilog=_EPILOG,
         description='Record every topic of the suite, images and rig_markers aside, as it comes off the wire.',
-        formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--out', type=Path, metavar='DIR',
-                        help='folder of the recording; must not exist (default: recordings/DATE-TIME)')
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        '--out',
+        type=Path,
+        metavar='DIR',
+        help='folder of the recording; must not exist (default: recordings/DATE-TIME)',
+    )
     parser.add_argument('--note', default='', metavar='TEXT', help='what to keep with the recording')
-    parser.add_argument('--topics', nargs='+', default=[], metavar='NAME',
-                        help='further topics, image_raw or rig_markers for instance')
+    parser.add_argument(
+        '--topics', nargs='+', default=[], metavar='NAME', help='further topics, image_raw or rig_markers for instance'
+    )
     parser.add_argument('--namespace', default='', metavar='NS', help='of the suite')
     parser.add_argument('--domain', type=domain, metavar='N', help='ROS domain (default: ROS_DOMAIN_ID, or 0)')
     parser.set_defaults(run=record, prog='dcdrw record')
@@ -38,13 +46,16 @@ def record(options: argparse.Namespace) -> int:
         import rclpy
         from rclpy.parameter import Parameter
     except ImportError:
-        raise ValueError("a recording needs rclpy: source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' "
-                         'ros-jazzy-common-interfaces') from None
+        raise ValueError(
+            "a recording needs rclpy: source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' "
+            'ros-jazzy-common-interfaces'
+        ) from None
     require_libraries()
     if options.domain is not None:
         os.environ['ROS_DOMAIN_ID'] = str(options.domain)
     from dcdrw.nodes.recorder_node import RecorderNode
     from dcdrw_msgs_py.node import run, steady_clock
+
     folder = options.out or new_folder()
     values = {'record': True, 'folder': str(folder), 'note': options.note, 'topics': ' '.join(options.topics)}
     node: RecorderNode | None = None
@@ -59,8 +70,12 @@ def record(options: argparse.Namespace) -> int:
         if node and node.failure:
             rclpy.shutdown()
         elif node and node.recorder and sys.stderr.isatty():
-            print(f'\r\x1b[K{sum(node.recorder.counts.values())} messages, {node.recorder.size / 1e6:.1f} MB',
-                  end='', file=sys.stderr, flush=True)
+            print(
+                f'\r\x1b[K{sum(node.recorder.counts.values())} messages, {node.recorder.size / 1e6:.1f} MB',
+                end='',
+                file=sys.stderr,
+                flush=True,
+            )
 
     namespace = ['-r', f'__ns:=/{options.namespace.strip("/")}'] if options.namespace else []
     status = run('dcdrw record', make, ['--ros-args', *namespace])

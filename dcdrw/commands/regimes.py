@@ -35,9 +35,12 @@ of these conditions are necessary and which suffice. --json has the same in SI u
 def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        'regimes', help='whether a pair walks in step, and how far it is from stalling', epilog=_EPILOG,
+        'regimes',
+        help='whether a pair walks in step, and how far it is from stalling',
+        epilog=_EPILOG,
         description='Tell what it takes for a pair to walk in step, and whether it has it.',
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     add_rig_options(parser)
     parser.add_argument('--json', type=Path, metavar='OUT.json', help='write everything here, too')
     parser.set_defaults(run=run, prog='dcdrw regimes')
@@ -75,10 +78,12 @@ def record(rig: RigParams) -> dict[str, Any]:
         'gentlest_slope': _known(float(gentlest_slopes(alone).values[0])),
         'gentlest_slope_closed_form': gentlest_even_gait(alpha, plain.k, plain.b).slope,
         'gentlest_slope_uncoupled': gentlest_slope(rig.front),
-        'gentlest_slope_any_damping': _known(worst_slope), 'damping_that_needs_it': _known(worst_b),
+        'gentlest_slope_any_damping': _known(worst_slope),
+        'damping_that_needs_it': _known(worst_b),
         'stall_band': [_known(float(end.values[0])) for end in stall_bands(alone)],
         'stall_band_closed_form': [scales.damping * end for end in band] if band else None,
-        'limit_cycle': cycle, 'basin': _from_every_phase(rig, cycle['theta2']) if cycle else None,
+        'limit_cycle': cycle,
+        'basin': _from_every_phase(rig, cycle['theta2']) if cycle else None,
     }
 
 
@@ -92,11 +97,16 @@ def _limit_cycle(rig: RigParams) -> dict[str, Any] | None:
     even = even_gait_on(plain.front.alpha, plain.k, plain.b, rig.slope)
     rear = simulate(rig, State(rig.front.alpha, *fixed.state), strikes=2).strikes[-1]
     return {
-        'phase': float(return_map.phase(fixed.state)), 'theta2': fixed.state.theta2, 'period': fixed.period,
-        'velocity': rig.front.step_length / fixed.period, 'rear_strike': rear.t / fixed.period,
-        'moduli': abs(fixed.multipliers).tolist(), 'stable': fixed.stable,
-        'closed_form': even and {'theta2': even.theta2, 'period': even.period * scales.time,
-                                 'moduli': abs(even.multipliers).tolist()}}
+        'phase': float(return_map.phase(fixed.state)),
+        'theta2': fixed.state.theta2,
+        'period': fixed.period,
+        'velocity': rig.front.step_length / fixed.period,
+        'rear_strike': rear.t / fixed.period,
+        'moduli': abs(fixed.multipliers).tolist(),
+        'stable': fixed.stable,
+        'closed_form': even
+        and {'theta2': even.theta2, 'period': even.period * scales.time, 'moduli': abs(even.multipliers).tolist()},
+    }
 
 
 def _from_every_phase(rig: RigParams, theta2: float) -> dict[str, Any] | None:
@@ -115,26 +125,49 @@ def report(rig: RigParams, found: dict[str, Any]) -> Iterator[tuple[str, str]]:
     plain = nondimensional(rig)[0]
     yield 'coupler', f'{rig.k:.4g} N/m, {rig.b:.4g} N·s/m: k̂ = {plain.k:.4g}, b̂ = {plain.b:.4g}'
     least = found['gentlest_slope']
-    yield 'slope', f'{_degrees(rig.slope)}; this coupler needs more than {_degrees(least)} ' \
-        f'(closed form {_degrees(found["gentlest_slope_closed_form"])})'
-    yield '', f'no damper stalls above {_degrees(found["gentlest_slope_any_damping"])}; the worst has ' \
-        f'{_number(found["damping_that_needs_it"])} N·s/m'
+    yield (
+        'slope',
+        f'{_degrees(rig.slope)}; this coupler needs more than {_degrees(least)} '
+        f'(closed form {_degrees(found["gentlest_slope_closed_form"])})',
+    )
+    yield (
+        '',
+        f'no damper stalls above {_degrees(found["gentlest_slope_any_damping"])}; the worst has '
+        f'{_number(found["damping_that_needs_it"])} N·s/m',
+    )
     low, high = found['stall_band']
     closed = found['stall_band_closed_form']
-    yield 'stall band', (f'{low:.4g} to {high:.4g} N·s/m' if low and high else 'none that both edges bound'
-                         if low or high else 'none on this slope') + (
-        f' (closed form {closed[0]:.4g} to {closed[1]:.4g})' if closed else '')
+    yield (
+        'stall band',
+        (
+            f'{low:.4g} to {high:.4g} N·s/m'
+            if low and high
+            else 'none that both edges bound'
+            if low or high
+            else 'none on this slope'
+        )
+        + (f' (closed form {closed[0]:.4g} to {closed[1]:.4g})' if closed else ''),
+    )
     cycle = found['limit_cycle']
     if cycle is None:
         yield 'limit cycle', 'none: a wheel fails to pass its apex'
     else:
-        yield 'limit cycle', f'{cycle["velocity"]:.4f} m/s, a step in {cycle["period"]:.4f} s; moduli ' \
-            f'{" ".join(f"{modulus:.4f}" for modulus in cycle["moduli"])}'
-        yield '', f'the rear wheel strikes at {100 * cycle["rear_strike"]:.2f} % of the step\'s time; θ2* = ' \
-            f'{math.degrees(cycle["theta2"]):.3f}°, a phase of {100 * cycle["phase"]:.2f} %'
+        yield (
+            'limit cycle',
+            f'{cycle["velocity"]:.4f} m/s, a step in {cycle["period"]:.4f} s; moduli '
+            f'{" ".join(f"{modulus:.4f}" for modulus in cycle["moduli"])}',
+        )
+        yield (
+            '',
+            f"the rear wheel strikes at {100 * cycle['rear_strike']:.2f} % of the step's time; θ2* = "
+            f'{math.degrees(cycle["theta2"]):.3f}°, a phase of {100 * cycle["phase"]:.2f} %',
+        )
         if even := cycle['closed_form']:
-            yield '', f'closed form: a step in {even["period"]:.4f} s, θ2* = {math.degrees(even["theta2"]):.3f}°, ' \
-                f'moduli {" ".join(f"{modulus:.4f}" for modulus in even["moduli"])}'
+            yield (
+                '',
+                f'closed form: a step in {even["period"]:.4f} s, θ2* = {math.degrees(even["theta2"]):.3f}°, '
+                f'moduli {" ".join(f"{modulus:.4f}" for modulus in even["moduli"])}',
+            )
     for condition, holds in conditions(found).items():
         yield ('yes' if holds else 'NO'), condition
     yield 'so', 'the pair walks in step' if all(conditions(found).values()) else 'the pair does not walk in step'
@@ -149,10 +182,12 @@ def conditions(found: dict[str, Any]) -> dict[str, bool]:
     return {
         'there is a limit cycle': cycle is not None,
         'it is stable: every multiplier is below 1': bool(cycle and cycle['stable']),
-        f'it lies within {math.degrees(BAND):g}° of the goal: |θ2*| at the section':
-            bool(cycle and abs(cycle['theta2']) <= BAND),
-        f'{lead_there} of {starts} phases lead there, both wheels on their uncoupled limit cycles{slow}':
-            lead_there == starts}
+        f'it lies within {math.degrees(BAND):g}° of the goal: |θ2*| at the section': bool(
+            cycle and abs(cycle['theta2']) <= BAND
+        ),
+        f'{lead_there} of {starts} phases lead there, both wheels on their uncoupled limit cycles{slow}': lead_there
+        == starts,
+    }
 
 
 def _known(value: float) -> float | None:

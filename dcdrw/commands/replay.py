@@ -22,22 +22,43 @@ Exit status: 0 all was sent, 2 wrong input, 130 interrupted.
 def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        'replay', help='publish recorded joint states again', epilog=_EPILOG,
+        'replay',
+        help='publish recorded joint states again',
+        epilog=_EPILOG,
         description='Publish the joint states of a recording again, with their own stamps.',
-        formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('recording', type=Path, metavar='RECORDING',
-                        help="a recording's folder, that of a trial, or an .mcap or .db3 file")
-    parser.add_argument('--rate', type=positive, default=1.0, metavar='FACTOR',
-                        help='how many times as fast as it was (default: %(default)g)')
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        'recording',
+        type=Path,
+        metavar='RECORDING',
+        help="a recording's folder, that of a trial, or an .mcap or .db3 file",
+    )
+    parser.add_argument(
+        '--rate',
+        type=positive,
+        default=1.0,
+        metavar='FACTOR',
+        help='how many times as fast as it was (default: %(default)g)',
+    )
     parser.add_argument('--from', type=number, default=0.0, dest='begin', metavar='S', help='begin here (default: 0)')
-    parser.add_argument('--to', type=number, default=math.inf, dest='end', metavar='S',
-                        help='end here (default: at the end)')
+    parser.add_argument(
+        '--to', type=number, default=math.inf, dest='end', metavar='S', help='end here (default: at the end)'
+    )
     parser.add_argument('--loop', action='store_true', help='begin again at the end; Ctrl-C ends it')
-    parser.add_argument('--rig', type=Path, metavar='FILE.yaml',
-                        help="parameter file with the recorded joints' names (front_joint, rear_joint, coupler_joint), "
-                        "which then get the suite's")
-    parser.add_argument('--topic', default=JOINT_STATES.name, metavar='NAME',
-                        help='where the joint states are, in any namespace (default: %(default)s)')
+    parser.add_argument(
+        '--rig',
+        type=Path,
+        metavar='FILE.yaml',
+        help="parameter file with the recorded joints' names (front_joint, rear_joint, coupler_joint), "
+        "which then get the suite's",
+    )
+    parser.add_argument(
+        '--topic',
+        default=JOINT_STATES.name,
+        metavar='NAME',
+        help='where the joint states are, in any namespace (default: %(default)s)',
+    )
     parser.add_argument('--namespace', default='', metavar='NS', help='of the topics to publish')
     parser.set_defaults(run=replay, prog='dcdrw replay')
 
@@ -47,10 +68,13 @@ def replay(options: argparse.Namespace) -> int:
     try:
         import rclpy
     except ImportError:
-        raise ValueError("a replay needs rclpy: source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' "
-                         'ros-jazzy-common-interfaces') from None
+        raise ValueError(
+            "a replay needs rclpy: source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' "
+            'ros-jazzy-common-interfaces'
+        ) from None
     from dcdrw.nodes.replay_node import Part, ReplayNode
     from dcdrw_msgs_py.node import run, steady_clock
+
     names = _names(options.rig)
     with Recording(options.recording) as recording:
         topic = recording.find(options.topic)
@@ -66,8 +90,14 @@ def replay(options: argparse.Namespace) -> int:
         def show() -> None:
             if node and sys.stderr.isatty():
                 at = (node.log_ns - recording.start_ns) / 1e9
-                print(f'\r\x1b[K{at:6.1f} s  {node.sent} joint states' if node.sent else
-                      '\r\x1b[Kwaiting for a listener of joint_states ...', end='', file=sys.stderr, flush=True)
+                print(
+                    f'\r\x1b[K{at:6.1f} s  {node.sent} joint states'
+                    if node.sent
+                    else '\r\x1b[Kwaiting for a listener of joint_states ...',
+                    end='',
+                    file=sys.stderr,
+                    flush=True,
+                )
             if node and node.done:
                 rclpy.shutdown()
 

@@ -75,16 +75,27 @@ STEP_COLUMNS = ('trial', 'wheel', 'steps', 'seconds', 'x', 'error_percent')
 def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        'report', help='recorded trials on one page', epilog=_EPILOG,
+        'report',
+        help='recorded trials on one page',
+        epilog=_EPILOG,
         description='Compare recorded trials on one page: pictures, verdicts, how fast each came into step.',
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument('recordings', type=Path, nargs='+', metavar='RECORDING')
     parser.add_argument('--out', type=Path, required=True, metavar='REPORT.html', help='the page to write')
     parser.add_argument('--title', default='Trials', metavar='TEXT', help='its heading (default: %(default)s)')
-    parser.add_argument('--rig', type=Path, metavar='FILE.yaml',
-                        help='parameters that differ from those recorded: a ROS 2 parameter file')
-    parser.add_argument('--topic', default=JOINT_STATES.name, metavar='NAME',
-                        help='where the joint states are, in any namespace (default: %(default)s)')
+    parser.add_argument(
+        '--rig',
+        type=Path,
+        metavar='FILE.yaml',
+        help='parameters that differ from those recorded: a ROS 2 parameter file',
+    )
+    parser.add_argument(
+        '--topic',
+        default=JOINT_STATES.name,
+        metavar='NAME',
+        help='where the joint states are, in any namespace (default: %(default)s)',
+    )
     parser.set_defaults(run=run, prog='dcdrw report')
 
 
@@ -103,9 +114,10 @@ def run(options: argparse.Namespace) -> int:
             print(f'dcdrw report: left out: {error}', file=sys.stderr)
     if not trials:
         raise ValueError('none of the recordings can be read: there is nothing to report')
-    small = {'trials.csv': table(TRIAL_COLUMNS, ([column(trial) for column in TRIAL_COLUMNS.values()]
-                                                 for trial in trials)),
-             'steps.csv': table(STEP_COLUMNS, (row for trial in trials for row in _steps(trial)))}
+    small = {
+        'trials.csv': table(TRIAL_COLUMNS, ([column(trial) for column in TRIAL_COLUMNS.values()] for trial in trials)),
+        'steps.csv': table(STEP_COLUMNS, (row for trial in trials for row in _steps(trial))),
+    }
     text = page(options.title, trials, small)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     tables.mkdir()
@@ -165,8 +177,11 @@ def _new_name(path: Path, others: list[Trial]) -> str:
     path = path.resolve()
     name = path.stem if path.is_file() else path.parent.name if path.name == 'recording' else path.name
     taken = {trial.name for trial in others}
-    return next(candidate for candidate in (name, *(f'{name} ({number})' for number in range(2, len(taken) + 3)))
-                if candidate not in taken)
+    return next(
+        candidate
+        for candidate in (name, *(f'{name} ({number})' for number in range(2, len(taken) + 3)))
+        if candidate not in taken
+    )
 
 
 def _source(folder: Path) -> str:

@@ -24,12 +24,20 @@ real and imaginary part.
 def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        'map', help='multipliers and regressions of the return map', epilog=_EPILOG,
+        'map',
+        help='multipliers and regressions of the return map',
+        epilog=_EPILOG,
         description='Find the limit cycle of a pair and tell how fast the pair comes to it.',
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     add_rig_options(parser)
-    parser.add_argument('--steps', type=count, default=STEPS, metavar='N',
-                        help=f'steps of each of the {len(PHASES)} trials (default: %(default)s)')
+    parser.add_argument(
+        '--steps',
+        type=count,
+        default=STEPS,
+        metavar='N',
+        help=f'steps of each of the {len(PHASES)} trials (default: %(default)s)',
+    )
     parser.add_argument('--json', type=Path, metavar='OUT.json', help='write everything here, too')
     parser.set_defaults(run=run, prog='dcdrw map')
 
@@ -50,17 +58,27 @@ def report(return_map: ReturnMap, convergence: Convergence) -> Iterator[tuple[st
     """Lines for a person: a heading, empty where the last one goes on, and its content."""
     fixed, raw, affine, trials = convergence
     state, phase = fixed.state, _phase(return_map, convergence)
-    yield 'fixed point', (f'θ2* = {math.degrees(state.theta2):.3f}°, θ1′ = {state.omega1:.4f} rad/s, '
-                          f'θ2′ = {state.omega2:.4f} rad/s; a step takes {fixed.period:.4f} s')
+    yield (
+        'fixed point',
+        (
+            f'θ2* = {math.degrees(state.theta2):.3f}°, θ1′ = {state.omega1:.4f} rad/s, '
+            f'θ2′ = {state.omega2:.4f} rad/s; a step takes {fixed.period:.4f} s'
+        ),
+    )
     yield 'phase', f'{100 * phase:.1f} % of a step, {50 * phase:.1f} % of a stride'
     yield 'multipliers', f'{_numbers(fixed.multipliers)}   {"stable" if fixed.stable else "not stable"}'
     yield 'affine', f'{_numbers(affine.eigenvalues)}   {_quality(affine)}'
-    yield 'raw', f'{_numbers(raw.eigenvalues)}   {_quality(raw)}; the paper\'s'
+    yield 'raw', f"{_numbers(raw.eigenvalues)}   {_quality(raw)}; the paper's"
     yield '', 'its first is 1 with any coupler: θ1′, θ2′ and D do not vanish at the fixed point'
     yield 'convergence', f'{fixed.steps_per_decade:.1f} steps per decade of error'
     yield 'trials from', ' '.join(f'{100 * trial.phase:4.0f}' for trial in trials) + '   % of a step'
-    yield 'steps taken', (' '.join(f'{"-" if trial.steps is None else trial.steps:>4}' for trial in trials)
-                          + f'   until θ2 stays within {math.degrees(BAND):g}° of θ2*')
+    yield (
+        'steps taken',
+        (
+            ' '.join(f'{"-" if trial.steps is None else trial.steps:>4}' for trial in trials)
+            + f'   until θ2 stays within {math.degrees(BAND):g}° of θ2*'
+        ),
+    )
     for trial in trials:
         if trial.trouble:
             yield '', f'from {100 * trial.phase:.0f} %: {trial.trouble}'
@@ -72,18 +90,30 @@ def record(return_map: ReturnMap, convergence: Convergence) -> dict[str, Any]:
     phase = _phase(return_map, convergence)
     return {
         'fixed_point': {
-            **fixed.state._asdict(), 'theta2_deg': math.degrees(fixed.state.theta2), 'phase_percent': 100.0 * phase,
-            'phase_percent_of_stride': 50.0 * phase, 'period': fixed.period, 'stable': fixed.stable},
+            **fixed.state._asdict(),
+            'theta2_deg': math.degrees(fixed.state.theta2),
+            'phase_percent': 100.0 * phase,
+            'phase_percent_of_stride': 50.0 * phase,
+            'period': fixed.period,
+            'stable': fixed.stable,
+        },
         'derivative': fixed.derivative.tolist(),
         'multipliers': _pairs(fixed.multipliers),
         'moduli': abs(fixed.multipliers).tolist(),
         'steps_per_decade': fixed.steps_per_decade if fixed.stable else None,
-        'regressions': {name: {
-            'eigenvalues': _pairs(fit.eigenvalues), 'matrix': fit.matrix.tolist(), 'offset': fit.offset.tolist(),
-            'rank': fit.rank, 'singular_values': fit.singular_values.tolist()}
-            for name, fit in (('raw', raw), ('affine', affine))},
-        'trials': [{'phase_percent': 100.0 * trial.phase, 'steps': trial.steps, 'trouble': trial.trouble}
-                   for trial in trials],
+        'regressions': {
+            name: {
+                'eigenvalues': _pairs(fit.eigenvalues),
+                'matrix': fit.matrix.tolist(),
+                'offset': fit.offset.tolist(),
+                'rank': fit.rank,
+                'singular_values': fit.singular_values.tolist(),
+            }
+            for name, fit in (('raw', raw), ('affine', affine))
+        },
+        'trials': [
+            {'phase_percent': 100.0 * trial.phase, 'steps': trial.steps, 'trouble': trial.trouble} for trial in trials
+        ],
         'parameters': flatten(return_map.rig),
     }
 

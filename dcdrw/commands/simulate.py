@@ -28,17 +28,33 @@ MOST_SAMPLES = 20_000_000
 def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        'simulate', help='integrate cases from a JSON file', epilog=_EPILOG,
+        'simulate',
+        help='integrate cases from a JSON file',
+        epilog=_EPILOG,
         description='Integrate cases to their strikes, which are located to rounding error.',
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument('cases', type=Path, metavar='CASE.json', help='one case or a list of cases')
-    parser.add_argument('--strikes', type=Path, metavar='OUT.json',
-                        help='write the strikes here (default: print them, unless a trajectory is asked for)')
-    parser.add_argument('--count', type=count, metavar='N',
-                        help=f'strikes per case (default: as many as the case lists, else {DEFAULT_STRIKES})')
+    parser.add_argument(
+        '--strikes',
+        type=Path,
+        metavar='OUT.json',
+        help='write the strikes here (default: print them, unless a trajectory is asked for)',
+    )
+    parser.add_argument(
+        '--count',
+        type=count,
+        metavar='N',
+        help=f'strikes per case (default: as many as the case lists, else {DEFAULT_STRIKES})',
+    )
     parser.add_argument('--trajectory', type=Path, metavar='OUT.csv|OUT.npz', help='write the motion here')
-    parser.add_argument('--rate', type=positive, default=100.0, metavar='HZ',
-                        help='samples per unit of time of the trajectory (default: %(default)g)')
+    parser.add_argument(
+        '--rate',
+        type=positive,
+        default=100.0,
+        metavar='HZ',
+        help='samples per unit of time of the trajectory (default: %(default)g)',
+    )
     parser.set_defaults(run=simulate, prog='dcdrw simulate')
 
 
@@ -51,8 +67,7 @@ def simulate(options: argparse.Namespace) -> int:
     for case in cases:
         result = run(case.rig, case.state, strikes=options.count or case.listed_strikes)
         runs.append(result)
-        print(f'{case.name}: {len(result.strikes)} strikes in {result.duration:.6g}; {result.reason}',
-              file=sys.stderr)
+        print(f'{case.name}: {len(result.strikes)} strikes in {result.duration:.6g}; {result.reason}', file=sys.stderr)
     records = [run_record(case, result) for case, result in zip(cases, runs, strict=True)]
     text = json.dumps(records if is_list else records[0], indent=1)
     if options.strikes:
@@ -88,9 +103,14 @@ def _write_csv(path: Path, motions: list[tuple[str, Trajectory]]) -> None:
 
 def _write_npz(path: Path, motions: list[tuple[str, Trajectory]]) -> None:
     prefix = len(motions) > 1
-    np.savez_compressed(path, **{
-        f'{name}/{field}' if prefix else field: column
-        for name, motion in motions for field, column in motion._asdict().items()})
+    np.savez_compressed(
+        path,
+        **{
+            f'{name}/{field}' if prefix else field: column
+            for name, motion in motions
+            for field, column in motion._asdict().items()
+        },
+    )
 
 
 _WRITERS = {'.csv': _write_csv, '.npz': _write_npz}

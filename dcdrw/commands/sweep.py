@@ -39,20 +39,37 @@ examples:
 def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        'sweep', help='which couplers synchronize, and how fast', epilog=_EPILOG,
+        'sweep',
+        help='which couplers synchronize, and how fast',
+        epilog=_EPILOG,
         description='Simulate, judge and measure a rig over any two of its parameters.',
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument('--out', type=Path, required=True, metavar='OUT.nc', help='the netCDF file to make')
     add_rig_options(parser)
-    parser.add_argument('--x', type=axis, metavar='AXIS', help='(default: k over the paper\'s range)')
-    parser.add_argument('--y', type=axis, metavar='AXIS', help='(default: b over the paper\'s range)')
-    parser.add_argument('--seconds', type=positive, help='how long to simulate (default: 200 √(ℓ/g), the paper\'s)')
-    parser.add_argument('--starts', type=count, default=len(PHASES), metavar='N',
-                        help='initial phases, evenly spaced between 0 and 100 %% (default: %(default)s)')
-    parser.add_argument('--band-deg', type=positive, default=math.degrees(BAND), metavar='DEG',
-                        help='|θ2| at the section is to be within this (default: %(default)g)')
-    parser.add_argument('--no-trajectories', dest='trajectories', action='store_false',
-                        help='leave out the states at each section, which make up most of the file')
+    parser.add_argument('--x', type=axis, metavar='AXIS', help="(default: k over the paper's range)")
+    parser.add_argument('--y', type=axis, metavar='AXIS', help="(default: b over the paper's range)")
+    parser.add_argument('--seconds', type=positive, help="how long to simulate (default: 200 √(ℓ/g), the paper's)")
+    parser.add_argument(
+        '--starts',
+        type=count,
+        default=len(PHASES),
+        metavar='N',
+        help='initial phases, evenly spaced between 0 and 100 %% (default: %(default)s)',
+    )
+    parser.add_argument(
+        '--band-deg',
+        type=positive,
+        default=math.degrees(BAND),
+        metavar='DEG',
+        help='|θ2| at the section is to be within this (default: %(default)g)',
+    )
+    parser.add_argument(
+        '--no-trajectories',
+        dest='trajectories',
+        action='store_false',
+        help='leave out the states at each section, which make up most of the file',
+    )
     where = parser.add_mutually_exclusive_group()
     where.add_argument('--workers', type=count, metavar='N', help='cores to use (default: all)')
     where.add_argument('--scheduler', metavar='ADDRESS', help='run on the Dask cluster of this scheduler')
@@ -81,8 +98,15 @@ def chosen_sweep(options: argparse.Namespace) -> Sweep:
     """The sweep that the options describe."""
     rig = chosen_params(options).rig
     phases = tuple((j + 1) / (options.starts + 1) for j in range(options.starts))
-    return Sweep(rig, options.x or default_axis('k', rig), options.y or default_axis('b', rig),
-                 options.seconds or default_seconds(rig), phases, math.radians(options.band_deg), options.trajectories)
+    return Sweep(
+        rig,
+        options.x or default_axis('k', rig),
+        options.y or default_axis('b', rig),
+        options.seconds or default_seconds(rig),
+        phases,
+        math.radians(options.band_deg),
+        options.trajectories,
+    )
 
 
 def summary(path: Path) -> str:
@@ -119,6 +143,7 @@ def _cluster(address: str) -> Iterator[tuple[Executor, int]]:
     require_extra('distributed')
     from distributed import Client, KilledWorker
     from distributed.comm import CommClosedError
+
     try:
         client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -130,8 +155,9 @@ def _cluster(address: str) -> Iterator[tuple[Executor, int]]:
         try:
             yield client.get_executor(pure=False), 2 * threads
         except (KilledWorker, CommClosedError, CancelledError) as error:
-            raise OSError(f'the Dask cluster at {address} failed: {error}; the same command goes on from here'
-                          ) from None
+            raise OSError(
+                f'the Dask cluster at {address} failed: {error}; the same command goes on from here'
+            ) from None
 
 
 class Bar:
@@ -142,6 +168,7 @@ class Bar:
 
     def __enter__(self) -> 'Bar':
         from tqdm import tqdm
+
         self._make, self._bar = tqdm, None  # type: Any, Any
         return self
 
@@ -149,7 +176,8 @@ class Bar:
         """Show how far it is; what earlier runs did does not count for the rate."""
         if self._bar is None:
             self._bar = self._make(
-                desc=self._name, total=progress.total, initial=progress.points, unit=' points', disable=None)
+                desc=self._name, total=progress.total, initial=progress.points, unit=' points', disable=None
+            )
         self._bar.update(progress.points - self._bar.n)
 
     def __exit__(self, *_: object) -> None:
@@ -160,6 +188,7 @@ class Bar:
 @contextmanager
 def _ended_by_signals() -> Iterator[None]:
     """SIGTERM and SIGHUP end as Ctrl-C does."""
+
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 

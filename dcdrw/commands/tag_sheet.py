@@ -33,13 +33,19 @@ class SheetParams(NamedTuple):
 def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        'tags', help='print the tags of the wheels, true to scale',
+        'tags',
+        help='print the tags of the wheels, true to scale',
         description='Write the AprilTags of a rig to a PDF: true to scale, with a ruler to check it, cut lines and '
-                    'instructions for mounting.')
+        'instructions for mounting.',
+    )
     parser.add_argument('--out', type=Path, required=True, metavar='FILE.pdf', help='the sheet; must not exist')
-    parser.add_argument('--rig', type=Path, metavar='FILE.yaml',
-                        help='the rig: family, size, and front.ids, rear.ids and so on (default: a tag of '
-                             f'{1000 * TagParams().size:g} mm on each hub)')
+    parser.add_argument(
+        '--rig',
+        type=Path,
+        metavar='FILE.yaml',
+        help='the rig: family, size, and front.ids, rear.ids and so on (default: a tag of '
+        f'{1000 * TagParams().size:g} mm on each hub)',
+    )
     parser.add_argument('--paper', choices=PAPERS, default='a4', help='(default: %(default)s)')
     parser.set_defaults(run=run, prog='dcdrw tags')
 
@@ -58,8 +64,10 @@ def run(options: argparse.Namespace) -> int:
     with rc_context({'pdf.fonttype': 42}), PdfPages(options.out, metadata={'Title': 'AprilTags of a dcdrw rig'}) as pdf:
         for page in pages:
             pdf.savefig(page)
-    print(f'Written: {options.out}, {len(pages)} page{"s" * (len(pages) > 1)} of {options.paper}. Print at 100 %: the '
-          'ruler must be 100 mm long.')
+    print(
+        f'Written: {options.out}, {len(pages)} page{"s" * (len(pages) > 1)} of {options.paper}. Print at 100 %: the '
+        'ruler must be 100 mm long.'
+    )
     return 0
 
 
@@ -85,16 +93,18 @@ def draw_pages(tags: TagParams, paper: str) -> list[Any]:
     if not places:
         fits = min(width - 2 * _EDGE, height - 2 * _EDGE - _FOOT - _TAB)
         side = 1000.0 * tags.size
-        raise ValueError(f'a tag of {side:g} mm is {boards[0]:g} mm wide with its white border; {paper} takes tags of '
-                         f'up to {math.floor(fits * side / boards[0])} mm: choose a larger --paper '
-                         f'({", ".join(PAPERS)}), or a smaller size in the rig file')
+        raise ValueError(
+            f'a tag of {side:g} mm is {boards[0]:g} mm wide with its white border; {paper} takes tags of '
+            f'up to {math.floor(fits * side / boards[0])} mm: choose a larger --paper '
+            f'({", ".join(PAPERS)}), or a smaller size in the rig file'
+        )
     pages = []
     for first in range(0, len(all_mounts), len(places)):
         page = Figure(figsize=(width * _MM, height * _MM))
         axes = page.add_axes((0.0, 0.0, 1.0, 1.0))
         axes.set(xlim=(0.0, width), ylim=(0.0, height))
         axes.set_axis_off()
-        chosen = all_mounts[first:first + len(places)]
+        chosen = all_mounts[first : first + len(places)]
         for mount, place in zip(chosen, places, strict=False):
             _draw_tag(axes, mount, tags.family, *place)
         _draw_foot(axes, width, tags, chosen)
@@ -129,27 +139,44 @@ def _draw_tag(axes: Any, mount: Mount, family: str, left: float, low: float) -> 
     # One path for all black cells: between shapes of their own, viewers show hairlines.
     rows, columns = np.nonzero(~cells)
     x, y = left + white + columns * cell, low + board - white - (rows + 1) * cell
-    squares = np.stack([np.stack((x + dx * cell, y + dy * cell), axis=-1)
-                        for dx, dy in ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))], axis=1)
+    squares = np.stack(
+        [np.stack((x + dx * cell, y + dy * cell), axis=-1) for dx, dy in ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))],
+        axis=1,
+    )
     codes = np.tile((Outline.MOVETO, Outline.LINETO, Outline.LINETO, Outline.LINETO, Outline.CLOSEPOLY), len(x))
     axes.add_patch(PathPatch(Outline(squares.reshape(-1, 2), codes), facecolor='black', linewidth=0))
-    axes.add_patch(Rectangle((left, low), board, board + _TAB, fill=False, edgecolor=_GREY, linewidth=0.4,
-                             linestyle=(0, (6, 4))))
+    axes.add_patch(
+        Rectangle((left, low), board, board + _TAB, fill=False, edgecolor=_GREY, linewidth=0.4, linestyle=(0, (6, 4)))
+    )
     tick, middle = min(3.0, 0.3 * white), 0.5 * board
-    for x0, x1, y0, y1 in ((0.0, tick, middle, middle), (board, board - tick, middle, middle),
-                           (middle, middle, 0.0, tick), (middle, middle, board, board - tick)):
+    for x0, x1, y0, y1 in (
+        (0.0, tick, middle, middle),
+        (board, board - tick, middle, middle),
+        (middle, middle, 0.0, tick),
+        (middle, middle, board, board - tick),
+    ):
         axes.plot((left + x0, left + x1), (low + y0, low + y1), color=_GREY, linewidth=0.4)
     # Where the slope's normal at ψ = 0 points, seen from the upright tag: the upright is turned from it by the angle.
     at, length = (left + 7.0, low + board + 0.5 * _TAB), 0.38 * _TAB
     dx, dy = length * math.sin(mount.angle), length * math.cos(mount.angle)
-    axes.annotate('', (at[0] + dx, at[1] + dy), (at[0] - dx, at[1] - dy),
-                  arrowprops={'arrowstyle': '-|>', 'color': 'black', 'linewidth': 1.2, 'shrinkA': 0, 'shrinkB': 0})
+    axes.annotate(
+        '',
+        (at[0] + dx, at[1] + dy),
+        (at[0] - dx, at[1] - dy),
+        arrowprops={'arrowstyle': '-|>', 'color': 'black', 'linewidth': 1.2, 'shrinkA': 0, 'shrinkB': 0},
+    )
     on_hub = not (mount.x or mount.y)
     place = 'on the hub' if on_hub else f'x {1000 * mount.x:g} mm, y {1000 * mount.y:g} mm from the hub'
     size = min(9.0, 9.0 * board / 90.0)
     axes.text(left + 14.0, at[1], f'{mount.wheel} wheel   id {mount.id}', fontsize=size, weight='bold', va='center')
-    axes.text(left + board - 3.0, at[1], f'{family}   {1000 * mount.size:g} mm   {place}', fontsize=0.75 * size,
-              va='center', ha='right')
+    axes.text(
+        left + board - 3.0,
+        at[1],
+        f'{family}   {1000 * mount.size:g} mm   {place}',
+        fontsize=0.75 * size,
+        va='center',
+        ha='right',
+    )
 
 
 def _draw_foot(axes: Any, width: float, tags: TagParams, shown: Sequence[Mount]) -> None:
@@ -157,8 +184,13 @@ def _draw_foot(axes: Any, width: float, tags: TagParams, shown: Sequence[Mount])
     left, ruler = 0.5 * (width - 100.0), _EDGE + 40.0
     axes.plot((left, left + 100.0), (ruler, ruler), color='black', linewidth=0.5, solid_capstyle='butt')
     for mm in range(0, 101, 5):
-        axes.plot((left + mm, left + mm), (ruler, ruler + (3.5 if mm % 50 == 0 else 2.0 if mm % 10 == 0 else 1.2)),
-                  color='black', linewidth=0.4, solid_capstyle='butt')
+        axes.plot(
+            (left + mm, left + mm),
+            (ruler, ruler + (3.5 if mm % 50 == 0 else 2.0 if mm % 10 == 0 else 1.2)),
+            color='black',
+            linewidth=0.4,
+            solid_capstyle='butt',
+        )
     for mm in (0, 50, 100):
         axes.text(left + mm, ruler + 4.2, f'{mm}{" mm" * (mm == 100)}', fontsize=7, ha='center')
     off_hub = any(mount.x or mount.y for mount in shown)

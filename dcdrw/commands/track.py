@@ -41,8 +41,15 @@ from dcdrw_tracker.wheels.wheel_track import TrackParams
 
 AHEAD = 4
 """Frames that are decoded while others are tracked."""
-FRAMES = ('stamp_ns', 'run', 'psi1', 'omega1', 'psi2', 'omega2',
-          *(f'{name}{wheel}' for wheel in (1, 2) for name in ('tags', 'error_px', 'x', 'y')))
+FRAMES = (
+    'stamp_ns',
+    'run',
+    'psi1',
+    'omega1',
+    'psi2',
+    'omega2',
+    *(f'{name}{wheel}' for wheel in (1, 2) for name in ('tags', 'error_px', 'x', 'y')),
+)
 """Of frames.csv."""
 
 _EPILOG = """\
@@ -71,30 +78,62 @@ class TrackingParams(NamedTuple):
 def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        'track', help='track the wheels in a video, and judge the trial', epilog=_EPILOG,
+        'track',
+        help='track the wheels in a video, and judge the trial',
+        epilog=_EPILOG,
         description='From a video of the rig to joint states, phase, summary and picture.',
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     add_film_arguments(parser)
-    parser.add_argument('--out', type=Path, metavar='DIR', help='where to write; must not exist, or be empty '
-                        '(default: trials/DATE-TIME)')
-    parser.add_argument('--debug', type=Path, metavar='FILE.mp4',
-                        help='make a video with tags, hubs, spokes and stance legs drawn in; must not exist')
+    parser.add_argument(
+        '--out',
+        type=Path,
+        metavar='DIR',
+        help='where to write; must not exist, or be empty (default: trials/DATE-TIME)',
+    )
+    parser.add_argument(
+        '--debug',
+        type=Path,
+        metavar='FILE.mp4',
+        help='make a video with tags, hubs, spokes and stance legs drawn in; must not exist',
+    )
     parser.set_defaults(run=track, prog='dcdrw track')
 
 
 def add_film_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments that choose a `Film`."""
     parser.add_argument('video', type=Path, metavar='VIDEO')
-    parser.add_argument('--camera', type=Path, required=True, metavar='CAMERA.yaml',
-                        help='camera_info file of the camera that filmed, as camera_calibration writes it')
+    parser.add_argument(
+        '--camera',
+        type=Path,
+        required=True,
+        metavar='CAMERA.yaml',
+        help='camera_info file of the camera that filmed, as camera_calibration writes it',
+    )
     parser.add_argument('--rig', type=Path, metavar='RIG.yaml', help='what differs from the defaults')
-    parser.add_argument('--stamps', type=Path, metavar='FILE.csv',
-                        help='a line with the time stamp in ns for each frame, after a heading')
-    parser.add_argument('--frame-rate', type=positive, metavar='HZ', help="of the camera, in the place of time stamps")
-    parser.add_argument('--from', dest='start', type=number, default=0.0, metavar='SECONDS',
-                        help='of the video, from which on it counts (default: %(default)g)')
-    parser.add_argument('--to', dest='end', type=number, default=math.inf, metavar='SECONDS',
-                        help='of the video, up to which it counts (default: its end)')
+    parser.add_argument(
+        '--stamps',
+        type=Path,
+        metavar='FILE.csv',
+        help='a line with the time stamp in ns for each frame, after a heading',
+    )
+    parser.add_argument('--frame-rate', type=positive, metavar='HZ', help='of the camera, in the place of time stamps')
+    parser.add_argument(
+        '--from',
+        dest='start',
+        type=number,
+        default=0.0,
+        metavar='SECONDS',
+        help='of the video, from which on it counts (default: %(default)g)',
+    )
+    parser.add_argument(
+        '--to',
+        dest='end',
+        type=number,
+        default=math.inf,
+        metavar='SECONDS',
+        help='of the video, up to which it counts (default: its end)',
+    )
     parser.add_argument('--quiet', action='store_true', help='no live progress')
 
 
@@ -121,8 +160,9 @@ def track(options: argparse.Namespace) -> int:
     _write_frames(frames, folder / 'frames.csv')
     try:
         rig, _, phase, sync = trial_params
-        record_joints(folder / RECORDING, samples, phase, (rig, phase, sync, *film.params),
-                      {'note': f'tracked in {film.path}'})
+        record_joints(
+            folder / RECORDING, samples, phase, (rig, phase, sync, *film.params), {'note': f'tracked in {film.path}'}
+        )
     except ValueError as error:
         print(f'dcdrw track: {error}', file=sys.stderr)
     return _finish(film, frames, trial, folder)
@@ -200,8 +240,9 @@ class Film:
             raise ValueError(f'{frames} no tag was seen; looked for {front} (front) and {rear} (rear) {looked}')
         for wheel, quality, ids in zip((FRONT, REAR), (status.front, status.rear), status.ids, strict=True):
             if not quality.frames:
-                raise ValueError(f'{frames} the {wheel} wheel was never seen; looked for tag '
-                                 f'{", ".join(map(str, ids))} {looked}')
+                raise ValueError(
+                    f'{frames} the {wheel} wheel was never seen; looked for tag {", ".join(map(str, ids))} {looked}'
+                )
         if not status.angles.samples:
             raise ValueError(f'{frames} the wheels were never tracked together')
 
@@ -248,9 +289,14 @@ def joint_batches(samples: Iterable[JointSample], names: PhaseParams) -> Iterato
     for run, group in groupby(samples, lambda sample: sample.run):
         part = list(group)
         turns = np.array([(sample.front, sample.rear) for sample in part])
-        yield JointBatch(f'{RUN}{run}', (names.front_joint, names.rear_joint),
-                         np.array([sample.stamp_ns for sample in part], np.int64), turns[:, :, 0], turns[:, :, 1],
-                         np.full(turns.shape[:2], math.nan))
+        yield JointBatch(
+            f'{RUN}{run}',
+            (names.front_joint, names.rear_joint),
+            np.array([sample.stamp_ns for sample in part], np.int64),
+            turns[:, :, 0],
+            turns[:, :, 1],
+            np.full(turns.shape[:2], math.nan),
+        )
 
 
 class _DebugVideo:
@@ -265,8 +311,15 @@ class _DebugVideo:
 
     def write(self, frame: Frame, tracked: Tracked) -> None:
         film = self._film
-        self._writer.write(draw(frame.image, tracked, film.tracker.mounts, film.camera,
-                                (film.params.track.front, film.params.track.rear)))
+        self._writer.write(
+            draw(
+                frame.image,
+                tracked,
+                film.tracker.mounts,
+                film.camera,
+                (film.params.track.front, film.params.track.rear),
+            )
+        )
 
 
 def _write_frames(frames: Sequence[Tracked], path: Path) -> None:
@@ -293,7 +346,7 @@ def quality(film: Film, frames: Sequence[Tracked]) -> dict[str, Any]:
         track = getattr(angles, name)
         return {
             'frames': len(views),
-            'reprojection_error_px': round(math.sqrt(np.mean([view.error_px ** 2 for view in views])), 4),
+            'reprojection_error_px': round(math.sqrt(np.mean([view.error_px**2 for view in views])), 4),
             'tag_size_px': round(float(np.mean([view.size_px for view in views])), 1),
             'tags_per_frame': round(float(np.mean([view.tags for view in views])), 2),
             'outliers': track.outliers,
@@ -322,9 +375,14 @@ def _finish(film: Film, frames: Sequence[Tracked], trial: Analysis, folder: Path
     told = quality(film, frames)
     print(sentence(trial))
     missing = f'; {told["frames_missing"]} frames are missing' if told['frames_missing'] else ''
-    print(f'{told["frames_with_both_wheels"]} of {told["frames"]} frames show both wheels{missing}. ' + '; '.join(
-        f'{name}: tags of {told[name]["tag_size_px"]:.0f} px, {told[name]["reprojection_error_px"]:.2f} px off, '
-        f'{sum(told[name]["outliers"].values())} outliers' for name in (FRONT, REAR)))
+    print(
+        f'{told["frames_with_both_wheels"]} of {told["frames"]} frames show both wheels{missing}. '
+        + '; '.join(
+            f'{name}: tags of {told[name]["tag_size_px"]:.0f} px, {told[name]["reprojection_error_px"]:.2f} px off, '
+            f'{sum(told[name]["outliers"].values())} outliers'
+            for name in (FRONT, REAR)
+        )
+    )
     for line in _warnings(told):
         print(f'dcdrw track: {line}', file=sys.stderr)
     end = 'interrupted' if film.interrupted else film.complaint or 'complete'
@@ -340,12 +398,18 @@ def _finish(film: Film, frames: Sequence[Tracked], trial: Analysis, folder: Path
 
 def _warnings(told: dict[str, Any]) -> Iterator[str]:
     if told['times_the_turns_were_lost']:
-        yield (f'the number of turns was lost {told["times_the_turns_were_lost"]} times; each time, steps are counted '
-               'afresh')
+        yield (
+            f'the number of turns was lost {told["times_the_turns_were_lost"]} times; each time, steps are counted '
+            'afresh'
+        )
     if told['frames_with_duplicate_tags']:
-        yield (f'in {told["frames_with_duplicate_tags"]} frames a tag of the rig is in the picture twice: '
-               'take the other one away')
+        yield (
+            f'in {told["frames_with_duplicate_tags"]} frames a tag of the rig is in the picture twice: '
+            'take the other one away'
+        )
     for name in (FRONT, REAR):
         if not told[name]['hub_travels_as_it_rolls']:
-            yield (f'the hub of the {name} wheel does not travel as the wheel rolls: see camera_follows, slope and '
-                   f'{name}.length in --rig')
+            yield (
+                f'the hub of the {name} wheel does not travel as the wheel rolls: see camera_follows, slope and '
+                f'{name}.length in --rig'
+            )

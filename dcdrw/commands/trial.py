@@ -63,17 +63,28 @@ class TrialError(Exception):
 def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        'trial', help='run a trial in simulation, live, and judge it', epilog=_EPILOG,
+        'trial',
+        help='run a trial in simulation, live, and judge it',
+        epilog=_EPILOG,
         description='Run simulator, phase estimator and synchronization monitor as processes over DDS.',
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     add_rig_options(parser)
-    parser.add_argument('--initial-phase', type=number, metavar='PERCENT',
-                        help='phase at the start, percent of a step (default: 21.6)')
+    parser.add_argument(
+        '--initial-phase', type=number, metavar='PERCENT', help='phase at the start, percent of a step (default: 21.6)'
+    )
     parser.add_argument('--seconds', type=positive, default=30.0, help='length of the trial (default: %(default)g)')
-    parser.add_argument('--camera', action='store_true',
-                        help='have the wheels tracked in the pictures of a virtual camera, and tell how well')
-    parser.add_argument('--out', type=Path, metavar='DIR', help='where to write; must not exist, or be empty '
-                        '(default: trials/DATE-TIME)')
+    parser.add_argument(
+        '--camera',
+        action='store_true',
+        help='have the wheels tracked in the pictures of a virtual camera, and tell how well',
+    )
+    parser.add_argument(
+        '--out',
+        type=Path,
+        metavar='DIR',
+        help='where to write; must not exist, or be empty (default: trials/DATE-TIME)',
+    )
     parser.add_argument('--domain', type=domain, metavar='N', help='ROS domain to use instead of a free one')
     parser.add_argument('--note', default='', metavar='TEXT', help='what to keep with the recording')
     parser.add_argument('--quiet', action='store_true', help='no live progress')
@@ -85,23 +96,31 @@ def trial(options: argparse.Namespace) -> int:
     try:
         import rclpy  # noqa: F401
     except ImportError:
-        raise ValueError("a trial needs rclpy: source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' "
-                         'ros-jazzy-common-interfaces') from None
+        raise ValueError(
+            "a trial needs rclpy: source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' "
+            'ros-jazzy-common-interfaces'
+        ) from None
     require_libraries()
     if options.camera:
         opencv()
     params = chosen_params(options)
     if options.initial_phase is not None:
-        params = params._replace(simulator=check(
-            params.simulator._replace(initial_phase_percent=options.initial_phase), '--initial-phase'))
+        params = params._replace(
+            simulator=check(params.simulator._replace(initial_phase_percent=options.initial_phase), '--initial-phase')
+        )
     if params.simulator.publish_clock:
         raise ValueError('a trial runs in real time: publish_clock must be false')
     start, _ = params.simulator.start(params.rig)  # an impossible start is told before anything runs
     # The joints are the simulator's, whatever the rig's own are called.
     joints = PhaseParams()
-    params = params._replace(phase=params.phase._replace(
-        S0=start.S0 - start.front.step_length, front_joint=joints.front_joint, rear_joint=joints.rear_joint,
-        coupler_joint=joints.coupler_joint))
+    params = params._replace(
+        phase=params.phase._replace(
+            S0=start.S0 - start.front.step_length,
+            front_joint=joints.front_joint,
+            rear_joint=joints.rear_joint,
+            coupler_joint=joints.coupler_joint,
+        )
+    )
     filmed = filmed_rig(options, params) if options.camera else None
     folder = free_folder(options.out)
     folder.mkdir(parents=True, exist_ok=True)
@@ -125,8 +144,9 @@ def free_folder(chosen: Path | None) -> Path:
 class _Trial:
     """One trial from start to summary."""
 
-    def __init__(self, params: TrialParams, filmed: FilmedRig | None, options: argparse.Namespace, folder: Path,
-                 domain: int) -> None:
+    def __init__(
+        self, params: TrialParams, filmed: FilmedRig | None, options: argparse.Namespace, folder: Path, domain: int
+    ) -> None:
         self.params, self.filmed, self.options, self.folder, self.domain = params, filmed, options, folder, domain
         self.executables: tuple[Executable, ...] = (*TRIAL, VIRTUAL_CAMERA, TAG_TRACKER) if filmed else TRIAL
         self.nodes: list[NodeProcess] = []
@@ -175,8 +195,9 @@ class _Trial:
             arguments = ['--ros-args', '--params-file', str(file)]
             if self.filmed and node in (SIMULATOR, VIRTUAL_CAMERA):
                 arguments += ['-r', f'{JOINT_STATES.name}:={TRUTH}']
-            self.nodes.append(NodeProcess(node.name, node.module, arguments, environment,
-                                          self.folder / f'{node.name}.log'))
+            self.nodes.append(
+                NodeProcess(node.name, node.module, arguments, environment, self.folder / f'{node.name}.log')
+            )
         self._say('starting the nodes ...')
         self._spin_until(self._all_at_work, START_SECONDS, 'no data came through the nodes')
 
@@ -186,13 +207,16 @@ class _Trial:
         if recorder is None or not {topic.name for topic in needed} <= self.observer.heard:
             return False
         told = recorder.values
-        return (all(int(told.get(f'messages of /{topic.name}', 0)) > 0 for topic in (JOINT_STATES, *needed))
-                and f'messages of /{FOOTFALLS.name}' in told
-                and all(node.name in told.get('parameters of', '') for node in self.executables))
+        return (
+            all(int(told.get(f'messages of /{topic.name}', 0)) > 0 for topic in (JOINT_STATES, *needed))
+            and f'messages of /{FOOTFALLS.name}' in told
+            and all(node.name in told.get('parameters of', '') for node in self.executables)
+        )
 
     def _let_go(self) -> None:
         """Release the wheels, which were held until the whole chain was seen to work."""
         from std_srvs.srv import SetBool
+
         client = self.observer.create_client(SetBool, '/simulator/pause')
         self._spin_until(client.service_is_ready, START_SECONDS, 'the service /simulator/pause was not found')
         self.observer.age.renew()
@@ -220,9 +244,11 @@ class _Trial:
     def _show(self) -> None:
         status, strikes = self.observer.monitor.status(), self.observer.strikes
         state = 'SYNCHRONIZED' if self.observer.synchronized else 'STALLED' if status.stalled else 'CONVERGING'
-        self._say(f'{self.observer.seconds:5.1f} s  phase {phase_text(status.phase)}  '
-                  f'error {status.error_percent:+5.1f} %  n {status.step_difference:+d}  '
-                  f'strikes {strikes[FRONT]} + {strikes[REAR]}  {state}')
+        self._say(
+            f'{self.observer.seconds:5.1f} s  phase {phase_text(status.phase)}  '
+            f'error {status.error_percent:+5.1f} %  n {status.step_difference:+d}  '
+            f'strikes {strikes[FRONT]} + {strikes[REAR]}  {state}'
+        )
 
     def _say(self, text: str) -> None:
         if self.options.quiet:
@@ -277,9 +303,14 @@ class _Trial:
         if truth:
             print(truth)
         try:
-            write_results(trial, self.folder, end=end, agreement=describe(agreements), diagnostics={
-                name: said.message for name, said in self.observer.diagnoses.items()},
-                **({'truth': truth._asdict()} if truth else {}))
+            write_results(
+                trial,
+                self.folder,
+                end=end,
+                agreement=describe(agreements),
+                diagnostics={name: said.message for name, said in self.observer.diagnoses.items()},
+                **({'truth': truth._asdict()} if truth else {}),
+            )
             print(f'Written: {self.folder}/')
         except ValueError as error:
             print(f'dcdrw trial: no picture: {error}', file=sys.stderr)

@@ -25,12 +25,19 @@ is for display, without inertia. Spoke 0, which stands at zero rotation, is blac
 def add_command(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
-        'urdf', help='the rig as a URDF, for RViz and Foxglove', epilog=_EPILOG,
-        description='Write a URDF with the dimensions of a rig.', formatter_class=argparse.RawDescriptionHelpFormatter)
+        'urdf',
+        help='the rig as a URDF, for RViz and Foxglove',
+        epilog=_EPILOG,
+        description='Write a URDF with the dimensions of a rig.',
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     add_rig_options(parser)
     parser.add_argument('--out', type=Path, metavar='FILE.urdf', help='where to write (default: print)')
-    parser.add_argument('--fixed-coupler', action='store_true',
-                        help='hubs at the coupler\'s rest length, for a source that does not tell its length')
+    parser.add_argument(
+        '--fixed-coupler',
+        action='store_true',
+        help="hubs at the coupler's rest length, for a source that does not tell its length",
+    )
     parser.set_defaults(run=run, prog='dcdrw urdf')
 
 
@@ -54,16 +61,19 @@ def make_urdf(params: TrialParams, fixed_coupler: bool = False) -> str:
     rig, names = params.rig.resolved(), params.phase
     joints = (names.front_joint, names.rear_joint, names.coupler_joint)
     if '' in joints or len(set(joints)) < len(joints):
-        raise ValueError(f'joints of a URDF need names of their own, got {", ".join(map(repr, joints))} '
-                         '(front_joint, rear_joint, coupler_joint)')
+        raise ValueError(
+            f'joints of a URDF need names of their own, got {", ".join(map(repr, joints))} '
+            '(front_joint, rear_joint, coupler_joint)'
+        )
     size = max(rig.front.length, rig.rear.length)
     robot = Element('robot', name='dcdrw')
     for name, rgba in _MATERIALS.items():
         SubElement(SubElement(robot, 'material', name=name), 'color', rgba=rgba)
     SubElement(robot, 'link', name=MarkerParams().frame)
     ground = SubElement(robot, 'link', name='slope')
-    _visual(ground, 'ground', ('box', {'size': _numbers(6.0 * size, 0.6 * size, 0.02 * size)}),
-            (0.0, 0.0, -0.01 * size))
+    _visual(
+        ground, 'ground', ('box', {'size': _numbers(6.0 * size, 0.6 * size, 0.02 * size)}), (0.0, 0.0, -0.01 * size)
+    )
     _joint(robot, 'inclination', 'fixed', MarkerParams().frame, 'slope', pitch=rig.slope)
     for hub, radius, sign in (('rear_hub', 0.03 * size, 1.0), ('front_hub', 0.02 * size, -1.0)):
         link, half = SubElement(robot, 'link', name=hub), 0.3 * rig.D0  # a tube, and a rod that slides in it
@@ -74,8 +84,10 @@ def make_urdf(params: TrialParams, fixed_coupler: bool = False) -> str:
     else:
         coupler = _joint(robot, names.coupler_joint, 'prismatic', 'rear_hub', 'front_hub', axis=(1.0, 0.0, 0.0))
         SubElement(coupler, 'limit', lower='0', upper=_numbers(LONGEST * size), effort='1e6', velocity='1e3')
-    for wheel, shape, joint, side in ((FRONT, rig.front, names.front_joint, 0.1 * size),
-                                      (REAR, rig.rear, names.rear_joint, -0.1 * size)):
+    for wheel, shape, joint, side in (
+        (FRONT, rig.front, names.front_joint, 0.1 * size),
+        (REAR, rig.rear, names.rear_joint, -0.1 * size),
+    ):
         _spokes(SubElement(robot, 'link', name=f'{wheel}_wheel'), wheel, shape, 0.01 * size)
         _joint(robot, joint, 'continuous', f'{wheel}_hub', f'{wheel}_wheel', (0.0, side, 0.0), axis=(0.0, 1.0, 0.0))
     ElementTree.indent(robot)
@@ -86,13 +98,25 @@ def _spokes(link: Element, wheel: str, shape: WheelParams, radius: float) -> Non
     """Spoke j's tip is at ℓ (−sin 2αj, −cos 2αj) from the hub, in the axes of the slope at zero rotation."""
     for j in range(int(shape.spokes)):
         angle, half = 2.0 * shape.alpha * j, 0.5 * shape.length
-        _visual(link, wheel if j else 'zero', _cylinder(shape.length, radius),
-                (-half * math.sin(angle), 0.0, -half * math.cos(angle)), angle)
+        _visual(
+            link,
+            wheel if j else 'zero',
+            _cylinder(shape.length, radius),
+            (-half * math.sin(angle), 0.0, -half * math.cos(angle)),
+            angle,
+        )
 
 
-def _joint(robot: Element, name: str, kind: str, parent: str, child: str,
-           at: tuple[float, float, float] = (0.0, 0.0, 0.0), pitch: float = 0.0,
-           axis: tuple[float, float, float] | None = None) -> Element:
+def _joint(
+    robot: Element,
+    name: str,
+    kind: str,
+    parent: str,
+    child: str,
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    pitch: float = 0.0,
+    axis: tuple[float, float, float] | None = None,
+) -> Element:
     joint = SubElement(robot, 'joint', name=name, type=kind)
     SubElement(joint, 'origin', xyz=_numbers(*at), rpy=_numbers(0.0, pitch, 0.0))
     SubElement(joint, 'parent', link=parent)
@@ -106,8 +130,13 @@ def _cylinder(length: float, radius: float) -> tuple[str, dict[str, str]]:
     return 'cylinder', {'length': _numbers(length), 'radius': _numbers(radius)}
 
 
-def _visual(link: Element, material: str, geometry: tuple[str, dict[str, str]],
-            at: tuple[float, float, float] = (0.0, 0.0, 0.0), pitch: float = 0.0) -> None:
+def _visual(
+    link: Element,
+    material: str,
+    geometry: tuple[str, dict[str, str]],
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    pitch: float = 0.0,
+) -> None:
     visual = SubElement(link, 'visual')
     SubElement(visual, 'origin', xyz=_numbers(*at), rpy=_numbers(0.0, pitch, 0.0))
     shape, attributes = geometry
@@ -120,5 +149,10 @@ def _numbers(*values: float) -> str:
 
 
 # As the markers and figures have them.
-_MATERIALS = {FRONT: '0 0.447 0.698 1', REAR: '0.835 0.369 0 1', 'zero': '0 0 0 1', 'coupler': '0.6 0.6 0.6 1',
-              'ground': '0.467 0.467 0.467 1'}
+_MATERIALS = {
+    FRONT: '0 0.447 0.698 1',
+    REAR: '0.835 0.369 0 1',
+    'zero': '0 0 0 1',
+    'coupler': '0.6 0.6 0.6 1',
+    'ground': '0.467 0.467 0.467 1',
+}

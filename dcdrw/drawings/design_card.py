@@ -21,8 +21,15 @@ LONGEST = 60
 """Steps that the page shows."""
 
 
-def draw_card(title: str, lines: dict[str, str], task: Task, grid: Scores, chosen: dict[str, Assessment],
-              parts: 'list[Part]', path: Path) -> None:
+def draw_card(
+    title: str,
+    lines: dict[str, str],
+    task: Task,
+    grid: Scores,
+    chosen: dict[str, Assessment],
+    parts: 'list[Part]',
+    path: Path,
+) -> None:
     """Draw the card into a PDF or PNG file, by the ending of its name.
 
     Args:
@@ -58,30 +65,60 @@ def draw_card(title: str, lines: dict[str, str], task: Task, grid: Scores, chose
 def _write(axes: Any, lines: dict[str, str]) -> None:
     axes.set_axis_off()
     for row, (text, colour) in enumerate(zip(lines.values(), COLOURS, strict=False)):
-        axes.text(0.0, 1.0 - row / len(lines), text, transform=axes.transAxes, va='top', fontsize=7.4,
-                  linespacing=1.25, bbox={'facecolor': 'none', 'edgecolor': colour, 'linewidth': 1.2, 'pad': 4.0})
+        axes.text(
+            0.0,
+            1.0 - row / len(lines),
+            text,
+            transform=axes.transAxes,
+            va='top',
+            fontsize=7.4,
+            linespacing=1.25,
+            bbox={'facecolor': 'none', 'edgecolor': colour, 'linewidth': 1.2, 'pad': 4.0},
+        )
 
 
 def _draw_map(axes: Any, grid: Scores, chosen: dict[str, Assessment], parts: 'list[Part]') -> None:
     """Steps from the worst start over k and b."""
     k, b, steps, verdict = (column.reshape(GRID, GRID) for column in (grid.k, grid.b, grid.steps, grid.verdict))
-    image = axes.pcolormesh(b, k, np.ma.masked_invalid(np.minimum(steps, LONGEST)), cmap='cividis_r', shading='nearest',
-                            vmin=0, vmax=LONGEST, rasterized=True)
+    image = axes.pcolormesh(
+        b,
+        k,
+        np.ma.masked_invalid(np.minimum(steps, LONGEST)),
+        cmap='cividis_r',
+        shading='nearest',
+        vmin=0,
+        vmax=LONGEST,
+        rasterized=True,
+    )
     stalls = (verdict >= Verdict.STALLS).astype(float)
     if 0.0 < stalls.mean() < 1.0:
         axes.contourf(b, k, stalls, levels=[0.5, 1.5], colors=['0.88'], hatches=['////'])
     figure = axes.figure
     figure.colorbar(image, ax=axes, label='steps, worst start', extend='max', pad=0.01)
     for name, colour, marker in zip(chosen, COLOURS, MARKERS, strict=False):
-        axes.plot(chosen[name].b, chosen[name].k, marker, color=colour, markeredgecolor='white', markersize=13,
-                  label=name, linestyle='none')
+        axes.plot(
+            chosen[name].b,
+            chosen[name].k,
+            marker,
+            color=colour,
+            markeredgecolor='white',
+            markersize=13,
+            label=name,
+            linestyle='none',
+        )
     if parts:
         for kind, line in (('spring', axes.axhline), ('dashpot', axes.axvline)):
             for part in parts:
                 if part.kind == kind:
                     line(part.value, color='0.35', linewidth=0.5)
-    axes.set(xscale='log', yscale='log', xlim=(b.min(), b.max()), ylim=(k.min(), k.max()), xlabel='b [N·s/m]',
-             ylabel='k [N/m]')
+    axes.set(
+        xscale='log',
+        yscale='log',
+        xlim=(b.min(), b.max()),
+        ylim=(k.min(), k.max()),
+        xlabel='b [N·s/m]',
+        ylabel='k [N/m]',
+    )
     axes.legend(loc='lower left', fontsize=8)
     axes.set_title('white: some start does not come into step; hatched: a wheel stalls', fontsize=8, loc='left')
 
@@ -95,8 +132,9 @@ def _draw_paths(axes: Any, task: Task, chosen: dict[str, Assessment]) -> None:
     for (name, found), colour, style in zip(chosen.items(), COLOURS, ('-', '--', ':'), strict=False):
         for number, path in enumerate(found.paths):
             error = scale * path[~np.isnan(path)]
-            axes.plot(error, style, color=colour, linewidth=1.0, marker='.', markersize=3,
-                      label=name if number == 0 else None)
+            axes.plot(
+                error, style, color=colour, linewidth=1.0, marker='.', markersize=3, label=name if number == 0 else None
+            )
         shown = max(shown, min(LONGEST, 3 * (1 if math.isnan(found.worst_steps) else int(found.worst_steps)) + 6))
     axes.set(xlim=(0, shown), ylim=(-50, 50), xlabel='steps of the front wheel', ylabel='error [% of a step]')
     axes.legend(loc='upper right', fontsize=8, ncols=4)
@@ -105,19 +143,33 @@ def _draw_paths(axes: Any, task: Task, chosen: dict[str, Assessment]) -> None:
 def _draw_sensitivity(axes: Any, chosen: dict[str, Assessment]) -> None:
     """Steps where one thing is off."""
     width = 0.8 / len(chosen)
-    known = [variation.steps for found in chosen.values() for variation in found.sensitivity
-             if not math.isnan(variation.steps)]
+    known = [
+        variation.steps
+        for found in chosen.values()
+        for variation in found.sensitivity
+        if not math.isnan(variation.steps)
+    ]
     highest = max(known, default=1.0)
     for row, ((name, found), colour) in enumerate(zip(chosen.items(), COLOURS, strict=False)):
         for place, variation in enumerate(found.sensitivity):
             x = place + (row - (len(chosen) - 1) / 2) * width
             if math.isnan(variation.steps):
-                axes.text(x, 0.02 * highest, variation.verdict.name.lower(), rotation=90, ha='center', va='bottom',
-                          fontsize=7, color=colour)
+                axes.text(
+                    x,
+                    0.02 * highest,
+                    variation.verdict.name.lower(),
+                    rotation=90,
+                    ha='center',
+                    va='bottom',
+                    fontsize=7,
+                    color=colour,
+                )
             else:
                 axes.bar(x, variation.steps, 0.9 * width, color=colour, label=name if place == 0 else None)
-    labels = [f'{variation.parameter} {100 * (variation.factor - 1):+.0f} %'
-              for variation in next(iter(chosen.values())).sensitivity]
+    labels = [
+        f'{variation.parameter} {100 * (variation.factor - 1):+.0f} %'
+        for variation in next(iter(chosen.values())).sensitivity
+    ]
     axes.set_xticks(range(len(labels)), labels, fontsize=8)
     axes.set(ylabel='steps, worst start', ylim=(0, 1.1 * highest))
     axes.set_title('what if one is off', fontsize=8, loc='left')

@@ -39,8 +39,12 @@ class MarkerParams(NamedTuple):
     rear_joint: Annotated[str, Quantity('name of the rear wheel in joint_states')] = PhaseParams().rear_joint
     coupler_joint: Annotated[str, Quantity('name of the coupler in joint_states')] = PhaseParams().coupler_joint
     frame: Annotated[str, Quantity('frame of the markers')] = 'rig'
-    follow: Annotated[bool, Quantity('the frame goes along with the rig; false: it stays at the first foothold of the '
-                                     'rear wheel', live=True)] = True
+    follow: Annotated[
+        bool,
+        Quantity(
+            'the frame goes along with the rig; false: it stays at the first foothold of the rear wheel', live=True
+        ),
+    ] = True
     redraw_rate: Annotated[float, Quantity('drawings per second at most', 'Hz', above=0.0, high=60.0)] = 30.0
     full_force: Annotated[float, Quantity('coupler force of the fullest colour', 'N', above=0.0, live=True)] = 20.0
 
@@ -97,8 +101,11 @@ class RigView:
         length = joints.coupler.length
         if math.isfinite(length):
             height = front.length * math.cos(theta1) - rear.length * math.cos(theta2)
-            S = (math.sqrt(max(length**2 - height**2, 0.0))
-                 - front.length * math.sin(theta1) + rear.length * math.sin(theta2))
+            S = (
+                math.sqrt(max(length**2 - height**2, 0.0))
+                - front.length * math.sin(theta1)
+                + rear.length * math.sin(theta2)
+            )
         else:
             S = front.length if math.isnan(self.params.S0) else self.params.S0
             if theta1 * front.spokes < theta2 * rear.spokes:
@@ -129,8 +136,13 @@ class RigView:
         theta = {FRONT: phase.front.angle, REAR: phase.rear.angle}
         steps = {FRONT: status.front_steps, REAR: status.rear_steps}
         wheels = {FRONT: params.front, REAR: params.rear}
-        hub = {wheel: (self.foot(wheel, steps[wheel]) + wheels[wheel].length * math.sin(theta[wheel]),
-                       wheels[wheel].length * math.cos(theta[wheel])) for wheel in wheels}
+        hub = {
+            wheel: (
+                self.foot(wheel, steps[wheel]) + wheels[wheel].length * math.sin(theta[wheel]),
+                wheels[wheel].length * math.cos(theta[wheel]),
+            )
+            for wheel in wheels
+        }
         middle = 0.5 * (hub[FRONT][0] + hub[REAR][0])
         origin = middle if params.follow else 0.0
         size = max(params.front.length, params.rear.length)
@@ -139,32 +151,62 @@ class RigView:
         def place(along: float, y: float, above: float) -> Point:
             return turned((along - origin, y, above), params.slope)
 
-        yield Shape('slope', _GROUND, 0.015 * size, place(0.0, 0.0, 0.0), params.slope,
-                    tuple(self._ground(middle - 3.0 * size, middle + 3.0 * size, 0.3 * size)))
+        yield Shape(
+            'slope',
+            _GROUND,
+            0.015 * size,
+            place(0.0, 0.0, 0.0),
+            params.slope,
+            tuple(self._ground(middle - 3.0 * size, middle + 3.0 * size, 0.3 * size)),
+        )
         for wheel, shape in wheels.items():
             y, colour = side[wheel], _COLOURS[wheel]
             centre, turn = place(hub[wheel][0], y, hub[wheel][1]), params.slope + theta[wheel]
             legs = [leg(shape.length, 2.0 * shape.alpha * j) for j in range(int(shape.spokes))]
             axle = ((0.0, 0.0, 0.0), (0.0, -y, 0.0))
-            yield Shape(f'{wheel}_wheel', faded(colour), 0.02 * size, centre, turn,
-                        tuple(point for tip in legs[1:] for point in ((0.0, 0.0, 0.0), tip)) + axle)
-            yield Shape(f'{wheel}_stance_leg', colour, 0.045 * size, centre, turn,
-                        ((0.0, 0.0, 0.0), legs[0]))
+            yield Shape(
+                f'{wheel}_wheel',
+                faded(colour),
+                0.02 * size,
+                centre,
+                turn,
+                tuple(point for tip in legs[1:] for point in ((0.0, 0.0, 0.0), tip)) + axle,
+            )
+            yield Shape(f'{wheel}_stance_leg', colour, 0.045 * size, centre, turn, ((0.0, 0.0, 0.0), legs[0]))
             if self._falls[wheel]:
-                yield Shape(f'{wheel}_footfalls', colour, 0.06 * size, place(0.0, y, 0.0), params.slope, tuple(
-                    (self.foot(wheel, n), end, 0.0) for n in self._falls[wheel] for end in (-0.05 * size, 0.05 * size)))
+                yield Shape(
+                    f'{wheel}_footfalls',
+                    colour,
+                    0.06 * size,
+                    place(0.0, y, 0.0),
+                    params.slope,
+                    tuple(
+                        (self.foot(wheel, n), end, 0.0)
+                        for n in self._falls[wheel]
+                        for end in (-0.05 * size, 0.05 * size)
+                    ),
+                )
         (x1, z1), (x2, z2) = hub[FRONT], hub[REAR]
-        yield Shape('coupler', force_colour(self._force / params.full_force), 0.018 * size,
-                    place(x2, 0.0, z2), params.slope + math.atan2(z2 - z1, x1 - x2),
-                    tuple(coupler_lines(math.hypot(x1 - x2, z1 - z2), 0.1 * size)))
-        lines = [phase_text(phase.phi.angle / (params.front.alpha + params.rear.alpha)),
-                 f'n = {phase.step_difference}']
+        yield Shape(
+            'coupler',
+            force_colour(self._force / params.full_force),
+            0.018 * size,
+            place(x2, 0.0, z2),
+            params.slope + math.atan2(z2 - z1, x1 - x2),
+            tuple(coupler_lines(math.hypot(x1 - x2, z1 - z2), 0.1 * size)),
+        )
+        lines = [phase_text(phase.phi.angle / (params.front.alpha + params.rear.alpha)), f'n = {phase.step_difference}']
         if math.isfinite(self._force):
             lines[1] += f', coupler {self._force:+.1f} N'
         if says:
             lines.append(says.message)
-        yield Shape('label', _LEVELS[says.level if says else Level.STALE], 0.16 * size,
-                    place(middle, 0.0, 2.5 * size), text='\n'.join(lines))
+        yield Shape(
+            'label',
+            _LEVELS[says.level if says else Level.STALE],
+            0.16 * size,
+            place(middle, 0.0, 2.5 * size),
+            text='\n'.join(lines),
+        )
 
     def _ground(self, start: float, end: float, side: float) -> Iterator[Point]:
         """A strip of the slope with a mark at every foothold of the rear wheel, so that one sees it pass."""
@@ -193,14 +235,16 @@ def leg(length: float, angle: float) -> Point:
 
 def coupler_lines(length: float, width: float) -> Iterator[Point]:
     """Spring and damper along x from hub to hub, the one above the other: points two by two."""
+
     def line(*points: tuple[float, float]) -> Iterator[Point]:
         for (x, z), (x_next, z_next) in pairwise(points):
             yield x * length, 0.0, z * width
             yield x_next * length, 0.0, z_next * width
 
     zigzag = [(0.2 + 0.6 * (i + 0.5) / (2 * COILS), 1.6 if i % 2 else 0.4) for i in range(2 * COILS)]
-    yield from line((0.0, 0.0), (0.12, 0.0), (0.12, 1.0), (0.2, 1.0), *zigzag, (0.8, 1.0), (0.88, 1.0), (0.88, 0.0),
-                    (1.0, 0.0))
+    yield from line(
+        (0.0, 0.0), (0.12, 0.0), (0.12, 1.0), (0.2, 1.0), *zigzag, (0.8, 1.0), (0.88, 1.0), (0.88, 0.0), (1.0, 0.0)
+    )
     yield from line((0.12, 0.0), (0.12, -1.0), (0.4, -1.0))
     yield from line((0.6, -0.5), (0.4, -0.5), (0.4, -1.5), (0.6, -1.5))  # the cylinder, open to the rod
     yield from line((0.52, -0.6), (0.52, -1.4))
@@ -231,5 +275,9 @@ def _colour(hexadecimal: str) -> Colour:
 _COLOURS = {FRONT: _colour('0072B2'), REAR: _colour('D55E00')}
 _TENSION, _NO_FORCE, _THRUST, _UNKNOWN = _colour('CC79A7'), _colour('999999'), _colour('56B4E9'), _colour('666666')
 _GROUND = _colour('777777')
-_LEVELS = {Level.OK: _colour('009E73'), Level.WARN: _colour('E69F00'), Level.ERROR: _colour('D55E00'),
-           Level.STALE: _colour('888888')}
+_LEVELS = {
+    Level.OK: _colour('009E73'),
+    Level.WARN: _colour('E69F00'),
+    Level.ERROR: _colour('D55E00'),
+    Level.STALE: _colour('888888'),
+}

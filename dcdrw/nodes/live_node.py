@@ -97,9 +97,12 @@ class RemoteParameters(Generic[Params]):
         self._getter.poll()
         self._setter.poll()
         if self._wanted and not self._setter.busy:
-            request = SetParameters.Request(parameters=[
-                ParameterMessage(name=name, value=Parameter(name, value=value).get_parameter_value())
-                for name, value in self._wanted.items()])
+            request = SetParameters.Request(
+                parameters=[
+                    ParameterMessage(name=name, value=Parameter(name, value=value).get_parameter_value())
+                    for name, value in self._wanted.items()
+                ]
+            )
             self._wanted.clear()
             self._setter.call(request, self._set)
 
@@ -108,8 +111,10 @@ class RemoteParameters(Generic[Params]):
         params = None
         if len(values) == len(self._names):
             with suppress(ValueError):
-                params = build(self._params, {
-                    name: parameter_value_to_python(value) for name, value in zip(self._names, values, strict=True)})
+                params = build(
+                    self._params,
+                    {name: parameter_value_to_python(value) for name, value in zip(self._names, values, strict=True)},
+                )
         self._on_change(params)
 
     def _set(self, answer: Any) -> None:
@@ -124,23 +129,33 @@ class LiveNode(Node):
     A simulator that starts `held` is let go once the whole chain is seen to work, so that none misses the start.
     """
 
-    def __init__(self, params: TrialParams, show: Callable[[dict[str, Any]], None], commands: SimpleQueue[Command],
-                 held: bool = False, **kwargs: Any) -> None:
+    def __init__(
+        self,
+        params: TrialParams,
+        show: Callable[[dict[str, Any]], None],
+        commands: SimpleQueue[Command],
+        held: bool = False,
+        **kwargs: Any,
+    ) -> None:
         super().__init__('live', **kwargs)
         self._state = LiveState(params)
         self._show, self._commands, self._held = show, commands, held
         self._prefix = self.get_namespace().strip('/') + '/' if self.get_namespace() != '/' else ''
         self._phase_reader = PhaseSampleReader()
         self._take_phase_params(params.phase)
-        for topic, take in ((JOINT_STATES, self._on_joints), (PHASE_STATE, self._on_phase),
-                            (FOOTFALLS, lambda message: self._state.take_footfall(footfall(message))),
-                            (SYNCHRONIZED, lambda message: self._state.take_verdict(message.data)),
-                            (DIAGNOSTICS, self._on_diagnostics)):
+        for topic, take in (
+            (JOINT_STATES, self._on_joints),
+            (PHASE_STATE, self._on_phase),
+            (FOOTFALLS, lambda message: self._state.take_footfall(footfall(message))),
+            (SYNCHRONIZED, lambda message: self._state.take_verdict(message.data)),
+            (DIAGNOSTICS, self._on_diagnostics),
+        ):
             listen(self, topic, _bearing(take))
         self._simulator = RemoteParameters(self, SIMULATOR.name, RigParams, self._state.take_controls)
         self._others = (
             RemoteParameters(self, PHASE_ESTIMATOR.name, PhaseParams, self._take_phase_params),
-            RemoteParameters(self, SYNC_MONITOR.name, SyncParams, self._take_sync_params))
+            RemoteParameters(self, SYNC_MONITOR.name, SyncParams, self._take_sync_params),
+        )
         self._reset = Service(self, Trigger, f'{SIMULATOR.name}/reset')
         self._pause = Service(self, SetBool, f'{SIMULATOR.name}/pause')
         self._record = Service(self, SetBool, f'{RECORDER.name}/record')
@@ -188,11 +203,13 @@ class LiveNode(Node):
         elif command.do == 'reset':
             self._reset.call(Trigger.Request(), self._answered)
         elif command.do == 'pause':
-            self._pause.call(SetBool.Request(data=command.value), lambda answer: self._switched(
-                answer, paused=command.value))
+            self._pause.call(
+                SetBool.Request(data=command.value), lambda answer: self._switched(answer, paused=command.value)
+            )
         else:
-            self._record.call(SetBool.Request(data=command.value), lambda answer: self._switched(
-                answer, recording=command.value))
+            self._record.call(
+                SetBool.Request(data=command.value), lambda answer: self._switched(answer, recording=command.value)
+            )
 
     def _told(self, reason: str) -> None:
         if reason:
@@ -211,7 +228,9 @@ class LiveNode(Node):
 
 def _bearing(take: Callable[[Any], None]) -> Callable[[Any], None]:
     """A callback that passes over what it cannot read: others may publish, too."""
+
     def bear(message: Any) -> None:
         with suppress(ValueError):
             take(message)
+
     return bear

@@ -36,9 +36,13 @@ class Observer(Node):
         self._first: PhaseSample | None = None
         self._last: PhaseSample | None = None
         self._reader = PhaseSampleReader()
-        for topic, callback in ((PHASE_STATE, self._on_phase), (SYNC_ERROR, self._on_error),
-                                (SYNCHRONIZED, self._on_synchronized), (FOOTFALLS, self._on_footfall),
-                                (DIAGNOSTICS, self._on_diagnostics)):
+        for topic, callback in (
+            (PHASE_STATE, self._on_phase),
+            (SYNC_ERROR, self._on_error),
+            (SYNCHRONIZED, self._on_synchronized),
+            (FOOTFALLS, self._on_footfall),
+            (DIAGNOSTICS, self._on_diagnostics),
+        ):
             listen(self, topic, self._bearing(topic.name, callback))
 
     @property
@@ -50,10 +54,12 @@ class Observer(Node):
 
     def _bearing(self, name: str, callback: Callable[[Any], None]) -> Callable[[Any], None]:
         """A callback that passes over what it cannot read: on a shared domain others may publish, too."""
+
         def bear(message: Any) -> None:
             with suppress(ValueError):
                 callback(message)
                 self.heard.add(name)
+
         return bear
 
     def _on_phase(self, message: Any) -> None:
@@ -81,5 +87,7 @@ class Observer(Node):
     def _on_diagnostics(self, message: Any) -> None:
         for status in message.status:
             self.diagnoses[status.name] = Diagnosis(
-                Level(min(status.level[0], Level.STALE)), status.message,
-                {pair.key: pair.value for pair in status.values})
+                Level(min(status.level[0], Level.STALE)),
+                status.message,
+                {pair.key: pair.value for pair in status.values},
+            )

@@ -47,9 +47,13 @@ class RecorderNode(Node):
         self._parameters: dict[str, dict[str, Any]] = {}
         self._asked: dict[str, float] = {}
         self._questions = {
-            node.name: (self.create_client(GetParameters, f'{node.name}/get_parameters'),
-                        [field.name for params in node.parameters for field in fields(params)])
-            for node in EXECUTABLES if node.name != RECORDER.name}
+            node.name: (
+                self.create_client(GetParameters, f'{node.name}/get_parameters'),
+                [field.name for params in node.parameters for field in fields(params)],
+            )
+            for node in EXECUTABLES
+            if node.name != RECORDER.name
+        }
         self._wanted = {self.resolve_topic_name(topic.name): topic for topic in RECORDED}
         for word in self._settings.value.topics.split():
             name, _, kind = word.partition(':')
@@ -130,13 +134,17 @@ class RecorderNode(Node):
             if node not in self._parameters and late and client.service_is_ready():
                 self._asked[node] = time.monotonic()
                 client.call_async(GetParameters.Request(names=names)).add_done_callback(
-                    partial(self._on_parameters, node, names))
+                    partial(self._on_parameters, node, names)
+                )
 
     def _listen(self, name: str, topic: Topic) -> None:
         offers = [offer.qos_profile for offer in self.get_publishers_info_by_topic(name)]
         reliable = all(offer.reliability == ReliabilityPolicy.RELIABLE for offer in offers)
-        latched = topic.latched if not offers else all(
-            offer.durability == DurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
+        latched = (
+            topic.latched
+            if not offers
+            else all(offer.durability == DurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
+        )
         ear = self._ears.get(name)
         if ear and (ear.reliable, ear.latched) == (reliable, latched):
             return
@@ -152,9 +160,15 @@ class RecorderNode(Node):
         qos = QoSProfile(
             depth=max(topic.depth, SAMPLE_DEPTH),
             reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-            durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE)
-        self._ears[name] = _Ear(reliable, latched, self.create_subscription(
-            message_type(topic), name, lambda data: self._on_message(name, data), qos, raw=True))
+            durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+        )
+        self._ears[name] = _Ear(
+            reliable,
+            latched,
+            self.create_subscription(
+                message_type(topic), name, lambda data: self._on_message(name, data), qos, raw=True
+            ),
+        )
 
     def _on_message(self, name: str, data: bytes) -> None:
         if self.recorder:
@@ -166,9 +180,13 @@ class RecorderNode(Node):
         if self.recorder is None or response is None or len(response.values) != len(names):
             return
         values = zip(names, map(parameter_value_to_python, response.values), strict=True)
-        self._parameters[node] = {'ros__parameters': {
-            name: list(value) if isinstance(value, (array, tuple)) else value
-            for name, value in values if value == value}}  # NaN: derived from others
+        self._parameters[node] = {
+            'ros__parameters': {
+                name: list(value) if isinstance(value, (array, tuple)) else value
+                for name, value in values
+                if value == value
+            }
+        }  # NaN: derived from others
         text = yaml.safe_dump(self._parameters, sort_keys=False, allow_unicode=True)
         self.recorder.about['parameters'] = text
         try:
@@ -198,9 +216,15 @@ class RecorderNode(Node):
             return Diagnosis(Level.ERROR, self.failure, {})
         if recorder is None:
             return Diagnosis(Level.OK, 'not recording', {})
-        return Diagnosis(Level.OK, f'recording to {recorder.folder}', {
-            'size': f'{recorder.size / 1e6:.1f} MB', 'parameters of': ', '.join(self._parameters),
-            **{f'messages of {topic}': str(count) for topic, count in recorder.counts.items()}})
+        return Diagnosis(
+            Level.OK,
+            f'recording to {recorder.folder}',
+            {
+                'size': f'{recorder.size / 1e6:.1f} MB',
+                'parameters of': ', '.join(self._parameters),
+                **{f'messages of {topic}': str(count) for topic, count in recorder.counts.items()},
+            },
+        )
 
 
 class _Ear(NamedTuple):

@@ -75,8 +75,12 @@ class ReplayNode(Node):
     def _wait(self) -> None:
         """Begin when somebody listens, and nobody new has come for a while."""
         now = time.monotonic()
-        found = (self._joints.get_subscription_count(), self._clock.get_subscription_count(),
-                 len(self.get_node_names()), len(self.get_topic_names_and_types()))
+        found = (
+            self._joints.get_subscription_count(),
+            self._clock.get_subscription_count(),
+            len(self.get_node_names()),
+            len(self.get_topic_names_and_types()),
+        )
         if found != self._found:
             self._found, self._since = found, now
         if self._joints.get_subscription_count() and now - self._since >= SETTLE_SECONDS:

@@ -105,11 +105,18 @@ def to_marker(shape: Shape, header: Any) -> Any:
     x, y, z, w = about_y(shape.turn)
     kind = Marker.TEXT_VIEW_FACING if shape.text else Marker.LINE_LIST
     return Marker(
-        header=header, ns=shape.name, id=0, type=kind, action=Marker.ADD,
+        header=header,
+        ns=shape.name,
+        id=0,
+        type=kind,
+        action=Marker.ADD,
         pose=Pose(position=_point(shape.position), orientation=Quaternion(x=x, y=y, z=z, w=w)),
         scale=Vector3(z=shape.size) if shape.text else Vector3(x=shape.size),
         color=ColorRGBA(**dict(zip('rgba', shape.colour, strict=True))),
-        lifetime=Duration(sec=LIFETIME), points=[_point(point) for point in shape.points], text=shape.text)
+        lifetime=Duration(sec=LIFETIME),
+        points=[_point(point) for point in shape.points],
+        text=shape.text,
+    )
 
 
 def _point(point: tuple[float, float, float]) -> Any:

@@ -33,7 +33,7 @@ _BROWSERS = 32
 """Browsers at a time."""
 _HEADERS = {
     'Content-Security-Policy': "default-src 'none'; script-src 'self'; style-src 'self'; img-src data:; "
-                               "connect-src 'self' ws://{host}; base-uri 'none'; frame-ancestors 'none'",
+    "connect-src 'self' ws://{host}; base-uri 'none'; frame-ancestors 'none'",
     'X-Content-Type-Options': 'nosniff',
     'Referrer-Policy': 'no-referrer',
     'Cache-Control': 'no-store',
@@ -120,8 +120,9 @@ class PageServer:
         await asyncio.gather(*(browser.close(code=1001) for browser in tuple(self._browsers)))
 
     @web.middleware
-    async def _guard(self, request: web.Request,
-                     handler: Callable[[web.Request], Awaitable[web.StreamResponse]]) -> web.StreamResponse:
+    async def _guard(
+        self, request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
+    ) -> web.StreamResponse:
         """Let in who knows the token or, where there is none, who came to this machine by its own name.
 
         The Host check keeps out pages whose name was made to point here (DNS rebinding), the Origin check pages of

@@ -199,8 +199,12 @@ class LiveState:
         frame: dict[str, Any] = {'state': state, 'detail': detail, 'run': self._run}
         if self._phases:
             frame['rig'] = self._rig()
-        for name, new in (('phis', self._phis), ('forces', self._forces), ('falls', self._falls),
-                          ('notices', self._notices)):
+        for name, new in (
+            ('phis', self._phis),
+            ('forces', self._forces),
+            ('falls', self._falls),
+            ('notices', self._notices),
+        ):
             if new:
                 frame[name] = list(new)
                 new.clear()
@@ -272,8 +276,10 @@ class LiveState:
             'stamp_ns': str(phase.stamp_ns),  # JavaScript's numbers do not hold it
             'theta': [_rounded(theta1, 5), _rounded(theta2, 5)],
             # Which spoke stands: it shows that the wheels roll.
-            'legs': [_rounded((joints.front.angle - theta1) / (2.0 * front.alpha), 0),
-                     _rounded((joints.rear.angle - theta2) / (2.0 * rear.alpha), 0)],
+            'legs': [
+                _rounded((joints.front.angle - theta1) / (2.0 * front.alpha), 0),
+                _rounded((joints.rear.angle - theta2) / (2.0 * rear.alpha), 0),
+            ],
             'n': phase.step_difference,
             'S': _rounded(self._stance_distance(phase, joints.coupler.length), 5),
             'phi_deg': _rounded(math.degrees(phase.phi.angle), 3),
@@ -331,8 +337,13 @@ def _control(field: Field, rig: RigParams) -> dict[str, Any]:
     quantity = field.quantity
     unit, scale = ('°', math.degrees(1.0)) if quantity.unit == 'rad' else (quantity.unit, 1.0)
     return {
-        'name': field.name, 'doc': quantity.doc, 'unit': unit, 'scale': scale,
-        'low': _rounded(quantity.low, 6), 'high': _rounded(quantity.high, 6), 'top': 4.0 * field.default,
+        'name': field.name,
+        'doc': quantity.doc,
+        'unit': unit,
+        'scale': scale,
+        'low': _rounded(quantity.low, 6),
+        'high': _rounded(quantity.high, 6),
+        'top': 4.0 * field.default,
         'value': lookup(rig, field.name),
     }
 

@@ -69,26 +69,32 @@ class _Layout:
         stamp_ns = stamps[:, 0] * 1_000_000_000 + (stamps[:, 1] & 0xFFFFFFFF)
         columns = []
         for begin, count in self._columns:
-            numbers = np.ascontiguousarray(rows[:, begin:begin + 8 * count]).view(f'{self._order}f8')
+            numbers = np.ascontiguousarray(rows[:, begin : begin + 8 * count]).view(f'{self._order}f8')
             given = count == len(self.names)
-            columns.append(numbers.astype(np.float64).reshape(len(rows), count) if given
-                           else np.full((len(rows), len(self.names)), np.nan))
+            columns.append(
+                numbers.astype(np.float64).reshape(len(rows), count)
+                if given
+                else np.full((len(rows), len(self.names)), np.nan)
+            )
         positions = self._columns[0][1]
-        error = '' if positions == len(self.names) else (
-            f'{len(self.names)} joints are named but {positions} positions given')
+        error = (
+            ''
+            if positions == len(self.names)
+            else (f'{len(self.names)} joints are named but {positions} positions given')
+        )
         return JointBatch(self.frame, self.names, stamp_ns, columns[0], columns[1], columns[2], error)
 
     def _count(self) -> int:
         self._at += -self._at % 4
         (count,) = struct.unpack_from(f'{self._order}I', self._data, self._at)
-        self.fixed[self._at:self._at + 4] = True
+        self.fixed[self._at : self._at + 4] = True
         self._at += 4
         return int(count)
 
     def _string(self) -> str:
         length = self._count()
         text = struct.unpack_from(f'{length}s', self._data, self._at)[0]
-        self.fixed[self._at:self._at + length] = True
+        self.fixed[self._at : self._at + length] = True
         self._at += length
         return str(text[:-1], 'utf-8')
 

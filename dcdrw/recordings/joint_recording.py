@@ -15,8 +15,13 @@ from dcdrw_tracker.gait.phase import PhaseParams
 TOPIC = f'/{JOINT_STATES.name}'
 
 
-def record_joints(folder: Path, samples: Iterable[JointSample], names: PhaseParams, params: Iterable[tuple[Any, ...]],
-                  about: dict[str, str]) -> None:
+def record_joints(
+    folder: Path,
+    samples: Iterable[JointSample],
+    names: PhaseParams,
+    params: Iterable[tuple[Any, ...]],
+    about: dict[str, str],
+) -> None:
     """Write a recording.
 
     Args:
@@ -44,15 +49,22 @@ def record_joints(folder: Path, samples: Iterable[JointSample], names: PhasePara
 
 def _serializer(names: PhaseParams) -> Any:
     from rosbags.typesys import Stores, get_typestore
+
     types = get_typestore(Stores.ROS2_JAZZY)
-    state, header, time = (types.types[name] for name in (
-        JOINT_STATES.type, 'std_msgs/msg/Header', 'builtin_interfaces/msg/Time'))
+    state, header, time = (
+        types.types[name] for name in (JOINT_STATES.type, 'std_msgs/msg/Header', 'builtin_interfaces/msg/Time')
+    )
 
     def serialize(sample: JointSample) -> bytes:
         (psi1, omega1), (psi2, omega2) = sample.front, sample.rear
         frame = f'{RUN}{sample.run}' if sample.run else ''
-        message = state(header(time(*divmod(sample.stamp_ns, 10**9)), frame), [names.front_joint, names.rear_joint],
-                        np.array((psi1, psi2)), np.array((omega1, omega2)), np.empty(0))
+        message = state(
+            header(time(*divmod(sample.stamp_ns, 10**9)), frame),
+            [names.front_joint, names.rear_joint],
+            np.array((psi1, psi2)),
+            np.array((omega1, omega2)),
+            np.empty(0),
+        )
         return bytes(types.serialize_cdr(message, JOINT_STATES.type))
 
     return serialize

@@ -67,8 +67,12 @@ def mend(file: Path) -> None:
     except BlockingIOError:
         raise ValueError(f'{file} is being recorded; end that first') from None
     except OSError as error:
-        raise OSError(error.errno, f'not closed, and not to be mended here ({error.strerror}): copy it to where '
-                                   'there is room and leave to write', str(file)) from None
+        raise OSError(
+            error.errno,
+            f'not closed, and not to be mended here ({error.strerror}): copy it to where '
+            'there is room and leave to write',
+            str(file),
+        ) from None
     print(f'{file} was not closed; mended: {sum(index.span.counts.values())} messages are whole', file=sys.stderr)
 
 
@@ -110,10 +114,15 @@ class _Index:
     @property
     def topics(self) -> list[RecordedTopic]:
         """The topics, as metadata.yaml tells them."""
-        return [RecordedTopic(channel.topic, self._schemas[channel.schema_id].name,
-                              channel.metadata.get('topic_type_hash', ''),
-                              yaml.safe_load(channel.metadata.get('offered_qos_profiles') or '[]'))
-                for channel in self._channels.values()]
+        return [
+            RecordedTopic(
+                channel.topic,
+                self._schemas[channel.schema_id].name,
+                channel.metadata.get('topic_type_hash', ''),
+                yaml.safe_load(channel.metadata.get('offered_qos_profiles') or '[]'),
+            )
+            for channel in self._channels.values()
+        ]
 
     @property
     def span(self) -> Span:
@@ -134,10 +143,16 @@ class _Index:
         for record in (*self._schemas.values(), *self._channels.values(), *self._chunks, *self._metadata):
             record.write(tail)
         Statistics(
-            attachment_count=0, channel_count=len(self._channels), channel_message_counts=self._counts,
-            chunk_count=len(self._chunks), message_count=sum(self._counts.values()), message_end_time=self._end_ns,
-            message_start_time=self._start_ns, metadata_count=len(self._metadata),
-            schema_count=len(self._schemas)).write(tail)
+            attachment_count=0,
+            channel_count=len(self._channels),
+            channel_message_counts=self._counts,
+            chunk_count=len(self._chunks),
+            message_count=sum(self._counts.values()),
+            message_end_time=self._end_ns,
+            message_start_time=self._start_ns,
+            metadata_count=len(self._metadata),
+            schema_count=len(self._schemas),
+        ).write(tail)
         Footer(start, 0, 0).write(tail)
         return bytes(tail.end()) + _MAGIC  # type: ignore[no-untyped-call]
 
@@ -173,16 +188,24 @@ class _Index:
         self._last = {}
         while at < size:
             kind, length = _HEAD.unpack_from(data, at)
-            found = self._take(kind, data[at + _HEAD.size:at + _HEAD.size + length])
+            found = self._take(kind, data[at + _HEAD.size : at + _HEAD.size + length])
             if found:
                 channel, log_ns = found
                 self._last.setdefault(channel, []).append((log_ns, at))
             at += _HEAD.size + length
-        self._chunks.append(ChunkIndex(
-            chunk_length=_HEAD.size + len(content), chunk_start_offset=begin, compression=chunk.compression,
-            compressed_size=len(chunk.data), message_end_time=chunk.message_end_time, message_index_length=0,
-            message_index_offsets={}, message_start_time=chunk.message_start_time,
-            uncompressed_size=chunk.uncompressed_size))
+        self._chunks.append(
+            ChunkIndex(
+                chunk_length=_HEAD.size + len(content),
+                chunk_start_offset=begin,
+                compression=chunk.compression,
+                compressed_size=len(chunk.data),
+                message_end_time=chunk.message_end_time,
+                message_index_length=0,
+                message_index_offsets={},
+                message_start_time=chunk.message_start_time,
+                uncompressed_size=chunk.uncompressed_size,
+            )
+        )
         return True
 
     def _take(self, kind: int, content: memoryview) -> tuple[int, int] | None:

@@ -49,12 +49,18 @@ class RecorderParams(NamedTuple):
     """What the recorder writes, and where to."""
 
     folder: Annotated[
-        str, Quantity("the recording's folder, which must not exist; empty: recordings/DATE-TIME, a new one for each",
-                      live=True)] = ''
+        str,
+        Quantity(
+            "the recording's folder, which must not exist; empty: recordings/DATE-TIME, a new one for each", live=True
+        ),
+    ] = ''
     note: Annotated[str, Quantity('what the operator has to say of the recording', live=True)] = ''
     topics: Annotated[
-        str, Quantity('further topics, images for instance, separated by spaces, or each with its type as NAME:TYPE',
-                      )] = ''
+        str,
+        Quantity(
+            'further topics, images for instance, separated by spaces, or each with its type as NAME:TYPE',
+        ),
+    ] = ''
     record: Annotated[bool, Quantity('begin at once: else when ~/record says so')] = False
 
 
@@ -82,11 +88,15 @@ class Span(NamedTuple):
 def offered_qos(reliable: bool, latched: bool, depth: int = 0) -> dict[str, Any]:
     """A QoS profile as rosbag2 writes it; depth 0: unknown, for DDS does not tell it."""
     return {
-        'history': 'keep_last' if depth else 'unknown', 'depth': depth,
+        'history': 'keep_last' if depth else 'unknown',
+        'depth': depth,
         'reliability': 'reliable' if reliable else 'best_effort',
         'durability': 'transient_local' if latched else 'volatile',
-        'deadline': _INFINITE, 'lifespan': _INFINITE, 'liveliness': 'automatic',
-        'liveliness_lease_duration': _INFINITE, 'avoid_ros_namespace_conventions': False,
+        'deadline': _INFINITE,
+        'lifespan': _INFINITE,
+        'liveliness': 'automatic',
+        'liveliness_lease_duration': _INFINITE,
+        'avoid_ros_namespace_conventions': False,
     }
 
 
@@ -101,15 +111,22 @@ def origin() -> dict[str, str]:
     revision = ''
     if (here / '.git').exists():
         with suppress(OSError):
-            revision = subprocess.run(['git', '-C', here, 'describe', '--always', '--dirty', '--abbrev=12'],
-                                      capture_output=True, text=True, check=False).stdout.strip()
+            revision = subprocess.run(
+                ['git', '-C', here, 'describe', '--always', '--dirty', '--abbrev=12'],
+                capture_output=True,
+                text=True,
+                check=False,
+            ).stdout.strip()
     try:
         release = version('dcdrw')
     except PackageNotFoundError:
         release = ''
-    return {'dcdrw_version': release, 'git_revision': revision,
-            'machine': f'{platform.node()}: {platform.platform()}, Python {platform.python_version()}',
-            'started': datetime.now().astimezone().isoformat(timespec='seconds')}
+    return {
+        'dcdrw_version': release,
+        'git_revision': revision,
+        'machine': f'{platform.node()}: {platform.platform()}, Python {platform.python_version()}',
+        'started': datetime.now().astimezone().isoformat(timespec='seconds'),
+    }
 
 
 class Recorder:
@@ -128,6 +145,7 @@ class Recorder:
         require_libraries()
         from mcap.writer import CompressionType, Writer
         from rosbags.typesys import Stores, get_typestore
+
         try:
             folder.mkdir(parents=True)
         except FileExistsError:
@@ -168,8 +186,12 @@ class Recorder:
             self._schemas[kind] = self._writer.register_schema(kind, 'ros2msg', definition.encode())
         topic = RecordedTopic(name, kind, self._types.hash_rihs01(kind), list(qos))
         self._topics[name] = topic
-        self._channels[name] = self._writer.register_channel(name, 'cdr', self._schemas[kind], {
-            'offered_qos_profiles': yaml_text(topic.qos).strip(), 'topic_type_hash': topic.hash})
+        self._channels[name] = self._writer.register_channel(
+            name,
+            'cdr',
+            self._schemas[kind],
+            {'offered_qos_profiles': yaml_text(topic.qos).strip(), 'topic_type_hash': topic.hash},
+        )
         self.counts[name] = 0
 
     def write(self, topic: str, data: bytes, log_ns: int | None = None) -> None:
@@ -209,8 +231,12 @@ class Recorder:
         self._file.close()
 
     def _metadata(self) -> dict[str, Any]:
-        return bag_metadata(self._file.path.name, list(self._topics.values()),
-                            Span(self.counts, self._start_ns, self._end_ns), self.about)
+        return bag_metadata(
+            self._file.path.name,
+            list(self._topics.values()),
+            Span(self.counts, self._start_ns, self._end_ns),
+            self.about,
+        )
 
     def _note_metadata(self) -> None:
         """The metadata within the file, as rosbag2 does it."""
@@ -227,16 +253,32 @@ def bag_metadata(file: str, topics: Sequence[RecordedTopic], span: Span, about: 
         'starting_time': {'nanoseconds_since_epoch': span.start_ns},
         'message_count': sum(span.counts.values()),
     }
-    return {INFORMATION: {
-        'version': _VERSION, 'storage_identifier': 'mcap', **extent,
-        'topics_with_message_count': [{
-            'topic_metadata': {'name': topic.name, 'type': topic.type, 'serialization_format': 'cdr',
-                               'offered_qos_profiles': topic.qos, 'type_description_hash': topic.hash},
-            'message_count': span.counts.get(topic.name, 0)} for topic in topics],
-        'compression_format': '', 'compression_mode': '',  # chunks are compressed by MCAP itself
-        'relative_file_paths': [file], 'files': [{'path': file, **extent}],
-        'custom_data': dict(about), 'ros_distro': os.environ.get('ROS_DISTRO', 'jazzy'),
-    }}
+    return {
+        INFORMATION: {
+            'version': _VERSION,
+            'storage_identifier': 'mcap',
+            **extent,
+            'topics_with_message_count': [
+                {
+                    'topic_metadata': {
+                        'name': topic.name,
+                        'type': topic.type,
+                        'serialization_format': 'cdr',
+                        'offered_qos_profiles': topic.qos,
+                        'type_description_hash': topic.hash,
+                    },
+                    'message_count': span.counts.get(topic.name, 0),
+                }
+                for topic in topics
+            ],
+            'compression_format': '',
+            'compression_mode': '',  # chunks are compressed by MCAP itself
+            'relative_file_paths': [file],
+            'files': [{'path': file, **extent}],
+            'custom_data': dict(about),
+            'ros_distro': os.environ.get('ROS_DISTRO', 'jazzy'),
+        }
+    }
 
 
 def write_whole(path: Path, text: str) -> None:
@@ -284,7 +326,7 @@ class _WholeFile:
         rest = memoryview(bytes(self._pending))
         try:
             while rest:
-                rest = rest[self._file.write(rest):]
+                rest = rest[self._file.write(rest) :]
         except OSError:
             self._file.truncate(self.size)
             raise

@@ -46,6 +46,7 @@ class Recording(AbstractContextManager['Recording']):
         from rosbags.rosbag2 import Reader
 
         from dcdrw.recordings.mending import is_closed, mend
+
         self.path = find(path)
         for file in [self.path] if self.path.is_file() else sorted(self.path.glob('*.mcap')):
             if not is_closed(file):
@@ -63,8 +64,9 @@ class Recording(AbstractContextManager['Recording']):
         self.end_ns: int = self._reader.end_time
         """When the first message came, and just after the last."""
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         """Close it."""
         self._reader.close()
 
@@ -85,16 +87,22 @@ class Recording(AbstractContextManager['Recording']):
             ValueError: there is none, or one in several namespaces.
 
         """
-        found = [topic for topic, its in self.types.items()
-                 if its == kind and (topic == name or topic.endswith(f'/{name.lstrip("/")}'))]
+        found = [
+            topic
+            for topic, its in self.types.items()
+            if its == kind and (topic == name or topic.endswith(f'/{name.lstrip("/")}'))
+        ]
         if len(found) == 1:
             return found[0]
         others = ', '.join(topic for topic, its in self.types.items() if its == kind) or 'none'
-        raise ValueError(f'{self.path} has {"several topics" if found else "no topic"} {name} of {kind}; '
-                         f'of this type it has: {others}')
+        raise ValueError(
+            f'{self.path} has {"several topics" if found else "no topic"} {name} of {kind}; '
+            f'of this type it has: {others}'
+        )
 
-    def messages(self, topics: Sequence[str], start_ns: int | None = None,
-                 stop_ns: int | None = None) -> Iterator[Message]:
+    def messages(
+        self, topics: Sequence[str], start_ns: int | None = None, stop_ns: int | None = None
+    ) -> Iterator[Message]:
         """The messages of these topics that came from start to before stop, in the order in which they came.
 
         Raises:

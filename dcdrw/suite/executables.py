@@ -56,39 +56,80 @@ class Executable(NamedTuple):
 
 
 SIMULATOR = Executable(
-    'simulator', 'dcdrw_sim.rig.simulator_node', 'the rig in simulation, in the place of the real one',
-    (RigParams, SimulatorParams), (COUPLER_FORCE_COMMAND,), (JOINT_STATES, CLOCK, DIAGNOSTICS),
-    ('~/reset (std_srvs/srv/Trigger)', '~/pause (std_srvs/srv/SetBool)'))
+    'simulator',
+    'dcdrw_sim.rig.simulator_node',
+    'the rig in simulation, in the place of the real one',
+    (RigParams, SimulatorParams),
+    (COUPLER_FORCE_COMMAND,),
+    (JOINT_STATES, CLOCK, DIAGNOSTICS),
+    ('~/reset (std_srvs/srv/Trigger)', '~/pause (std_srvs/srv/SetBool)'),
+)
 PHASE_ESTIMATOR = Executable(
-    'phase_estimator', 'dcdrw_tracker.gait.phase_estimator_node', 'from wheel rotations to phase, steps and footfalls',
-    (PhaseParams,), (JOINT_STATES,), (PHASE_STATE, PHI, STEP_DIFFERENCE, FOOTFALLS, DIAGNOSTICS))
+    'phase_estimator',
+    'dcdrw_tracker.gait.phase_estimator_node',
+    'from wheel rotations to phase, steps and footfalls',
+    (PhaseParams,),
+    (JOINT_STATES,),
+    (PHASE_STATE, PHI, STEP_DIFFERENCE, FOOTFALLS, DIAGNOSTICS),
+)
 SYNC_MONITOR = Executable(
-    'sync_monitor', 'dcdrw_tracker.gait.sync_monitor_node', 'how far from walking in step, and whether it stays there',
-    (SyncParams,), (PHASE_STATE,), (SYNC_ERROR, SYNC_ERROR_PERCENT, SYNCHRONIZED, DIAGNOSTICS))
+    'sync_monitor',
+    'dcdrw_tracker.gait.sync_monitor_node',
+    'how far from walking in step, and whether it stays there',
+    (SyncParams,),
+    (PHASE_STATE,),
+    (SYNC_ERROR, SYNC_ERROR_PERCENT, SYNCHRONIZED, DIAGNOSTICS),
+)
 
 MARKERS = Executable(
-    'rig_markers', 'dcdrw.nodes.rig_markers_node', 'the rig as markers, for RViz and Foxglove',
-    (MarkerParams,), (JOINT_STATES, DIAGNOSTICS), (RIG_MARKERS, DIAGNOSTICS))
+    'rig_markers',
+    'dcdrw.nodes.rig_markers_node',
+    'the rig as markers, for RViz and Foxglove',
+    (MarkerParams,),
+    (JOINT_STATES, DIAGNOSTICS),
+    (RIG_MARKERS, DIAGNOSTICS),
+)
 
 RECORDER = Executable(
-    'recorder', 'dcdrw.nodes.recorder_node', 'while it records: every topic but images and markers, into a recording',
-    (RecorderParams,), (), (DIAGNOSTICS,), ('~/record (std_srvs/srv/SetBool)',))
+    'recorder',
+    'dcdrw.nodes.recorder_node',
+    'while it records: every topic but images and markers, into a recording',
+    (RecorderParams,),
+    (),
+    (DIAGNOSTICS,),
+    ('~/record (std_srvs/srv/SetBool)',),
+)
 
 VIRTUAL_CAMERA = Executable(
-    'virtual_camera', 'dcdrw_sim.camera.virtual_camera_node', 'pictures of the rig, as a camera on its left would take them',
-    (SceneParams, ViewParams, LookParams, TagParams, ShutterParams), (JOINT_STATES,),
-    (IMAGE_RAW, CAMERA_INFO, DIAGNOSTICS))
+    'virtual_camera',
+    'dcdrw_sim.camera.virtual_camera_node',
+    'pictures of the rig, as a camera on its left would take them',
+    (SceneParams, ViewParams, LookParams, TagParams, ShutterParams),
+    (JOINT_STATES,),
+    (IMAGE_RAW, CAMERA_INFO, DIAGNOSTICS),
+)
 
 TAG_TRACKER = Executable(
-    'tag_tracker', 'dcdrw_tracker.node.tag_tracker_node', "from a camera's pictures, or motion capture, to wheel rotations",
+    'tag_tracker',
+    'dcdrw_tracker.node.tag_tracker_node',
+    "from a camera's pictures, or motion capture, to wheel rotations",
     (TagParams, PairViewParams, TrackParams, PoseParams, SourceParams),
     (IMAGE_RAW, IMAGE_COMPRESSED, CAMERA_INFO, FRONT_POSE, REAR_POSE),
-    (JOINT_STATES, TAG_DETECTIONS, DEBUG_IMAGE, DIAGNOSTICS), by_choice=(IMAGE_COMPRESSED, FRONT_POSE, REAR_POSE))
+    (JOINT_STATES, TAG_DETECTIONS, DEBUG_IMAGE, DIAGNOSTICS),
+    by_choice=(IMAGE_COMPRESSED, FRONT_POSE, REAR_POSE),
+)
 
 TRIAL = (SIMULATOR, PHASE_ESTIMATOR, SYNC_MONITOR)
 """The nodes of a trial in simulation."""
 EXECUTABLES = (*TRIAL, TAG_TRACKER, VIRTUAL_CAMERA, MARKERS, RECORDER)
 
-RECORDED = (*dict.fromkeys(topic for node in EXECUTABLES for topic in (*node.subscribes, *node.publishes)
-                           if not topic.type.endswith(('Image', 'MarkerArray'))), PARAMETER_EVENTS)
+RECORDED = (
+    *dict.fromkeys(
+        topic
+        for node in EXECUTABLES
+        for topic in (*node.subscribes, *node.publishes)
+        if not topic.type.endswith(('Image', 'MarkerArray'))
+    ),
+    PARAMETER_EVENTS,
+)
 """The topics that a recorder keeps unasked: no pictures, and no drawings of what the others tell."""

@@ -18,8 +18,11 @@ from dcdrw_tracker.gait.sync import SyncParams
 _EVERY_NODE = '/**'
 _PARAMETERS = 'ros__parameters'
 _OF_ROS = ('use_sim_time',)
-_NODES_OF = {kind: [node.name for node in EXECUTABLES if kind in node.parameters]
-             for each in EXECUTABLES for kind in each.parameters}
+_NODES_OF = {
+    kind: [node.name for node in EXECUTABLES if kind in node.parameters]
+    for each in EXECUTABLES
+    for kind in each.parameters
+}
 _NODES = tuple(dict.fromkeys(name for names in _NODES_OF.values() for name in names))
 Sets = TypeVar('Sets', bound=tuple[Any, ...])
 
@@ -39,7 +42,8 @@ class TrialParams(NamedTuple):
         return cls(
             rig,
             phase=PhaseParams(WheelShape(front.length, front.spokes), WheelShape(rear.length, rear.spokes)),
-            sync=SyncParams(WheelPitch(front.spokes), WheelPitch(rear.spokes)))
+            sync=SyncParams(WheelPitch(front.spokes), WheelPitch(rear.spokes)),
+        )
 
 
 def read_parameter_file(path: Path, base: Sets) -> Sets:
@@ -59,21 +63,28 @@ def read_parameter_file(path: Path, base: Sets) -> Sets:
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise ValueError(f'{path} is not YAML: {" ".join(str(error).split())}') from None
     if not isinstance(content, dict) or not all(_is_section(section) for section in content.values()):
-        raise ValueError(f'{path} is not a parameter file: it must have the form of config/rig.yaml, '
-                         f'"{_EVERY_NODE}:", "{_PARAMETERS}:", then the parameters')
+        raise ValueError(
+            f'{path} is not a parameter file: it must have the form of config/rig.yaml, '
+            f'"{_EVERY_NODE}:", "{_PARAMETERS}:", then the parameters'
+        )
     sections = {_EVERY_NODE, *_NODES, *(f'/{node}' for node in _NODES)}
     for section in content:
         if section not in sections:
-            raise ValueError(f'{path} has parameters for {section}, which no trial has; there are '
-                             f'{", ".join((_EVERY_NODE, *_NODES))}')
+            raise ValueError(
+                f'{path} has parameters for {section}, which no trial has; there are '
+                f'{", ".join((_EVERY_NODE, *_NODES))}'
+            )
     kinds = {name: type(values) for name, values in zip(base._fields, base, strict=True)}  # type: ignore[attr-defined]
     known = {field.name for kind in _NODES_OF for field in fields(kind)}.union(_OF_ROS)
     sets: dict[str, Any] = {}
     for name, kind in kinds.items():
         mine = {field.name for field in fields(kind)}
         own = (name for node in _NODES_OF[kind] for name in (node, f'/{node}'))
-        values = {key: value for section in (_EVERY_NODE, *own)
-                  for key, value in _flatten(content.get(section, {}).get(_PARAMETERS) or {})}
+        values = {
+            key: value
+            for section in (_EVERY_NODE, *own)
+            for key, value in _flatten(content.get(section, {}).get(_PARAMETERS) or {})
+        }
         chosen = {key: value for key, value in values.items() if key in mine or key not in known}
         sets[name] = build(kind, flatten(getattr(base, name)) | chosen, str(path))
     return type(base)(**sets)
@@ -82,10 +93,15 @@ def read_parameter_file(path: Path, base: Sets) -> Sets:
 def add_rig_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that choose a rig."""
     presets = '; '.join(f'{name}, {preset.doc}' for name, preset in PRESETS.items())
-    parser.add_argument('--preset', choices=PRESETS, default='paper', metavar='NAME',
-                        help=f'the rig: {presets} (default: %(default)s)')
-    parser.add_argument('--rig', type=Path, metavar='FILE.yaml',
-                        help='parameters that differ from the preset: a ROS 2 parameter file, as config/rig.yaml')
+    parser.add_argument(
+        '--preset', choices=PRESETS, default='paper', metavar='NAME', help=f'the rig: {presets} (default: %(default)s)'
+    )
+    parser.add_argument(
+        '--rig',
+        type=Path,
+        metavar='FILE.yaml',
+        help='parameters that differ from the preset: a ROS 2 parameter file, as config/rig.yaml',
+    )
 
 
 def chosen_params(options: argparse.Namespace) -> TrialParams:
@@ -119,18 +135,24 @@ def write_changed(source: Path | None, changes: Mapping[str, Any], path: Path, r
 
     """
     sections = yaml.safe_load(source.read_text(encoding='utf-8')) if source else {}
-    content = {section: {name: value for name, value in _flatten(tree[_PARAMETERS] or {}) if name not in changes}
-               for section, tree in sections.items()}
+    content = {
+        section: {name: value for name, value in _flatten(tree[_PARAMETERS] or {}) if name not in changes}
+        for section, tree in sections.items()
+    }
     content[_EVERY_NODE] = {**content.get(_EVERY_NODE, {}), **changes}
-    text = yaml.safe_dump({section: {_PARAMETERS: values} for section, values in content.items()}, sort_keys=False,
-                          allow_unicode=True)
+    text = yaml.safe_dump(
+        {section: {_PARAMETERS: values} for section, values in content.items()}, sort_keys=False, allow_unicode=True
+    )
     path.write_text(f'# {remark}\n{text}', encoding='utf-8')
 
 
 def given(values: tuple[Any, ...]) -> dict[str, Any]:
     """What a parameter file says of a set: no derived defaults, and lists of their own, for ROS reads no aliases."""
-    return {key: list(value) if isinstance(value, tuple) else value
-            for key, value in flatten(values).items() if value == value}
+    return {
+        key: list(value) if isinstance(value, tuple) else value
+        for key, value in flatten(values).items()
+        if value == value
+    }
 
 
 def _is_section(section: Any) -> bool:

@@ -51,10 +51,14 @@ class NodeProcess:
         self.log = log
         with log.open('wb') as file:
             self._process = subprocess.Popen(
-                [sys.executable, '-m', module, *arguments], stdin=subprocess.DEVNULL, stdout=file,
-                stderr=subprocess.STDOUT, env={**os.environ, **environment},
+                [sys.executable, '-m', module, *arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=file,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, **environment},
                 start_new_session=True,  # Ctrl-C reaches the trial alone, which then stops its nodes in order
-                preexec_fn=_end_with_parent)
+                preexec_fn=_end_with_parent,
+            )
 
     @property
     def failure(self) -> str | None:

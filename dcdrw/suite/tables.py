@@ -20,14 +20,28 @@ def tables() -> dict[str, str]:
     return {
         'executables': _table(
             ('executable', 'what it does', 'subscribes', 'publishes', 'services'),
-            ((f'`{node.name}`', node.doc, _names(node.subscribes), _names(node.publishes),
-              ', '.join(f'`{service}`' for service in node.services)) for node in EXECUTABLES)),
+            (
+                (
+                    f'`{node.name}`',
+                    node.doc,
+                    _names(node.subscribes),
+                    _names(node.publishes),
+                    ', '.join(f'`{service}`' for service in node.services),
+                )
+                for node in EXECUTABLES
+            ),
+        ),
         'topics': _table(
             ('topic', 'type', 'content', 'QoS'),
-            ((f'`{topic.name}`', f'`{topic.type}`', topic.doc, _qos(topic)) for topic in topics.values())),
-        **{f'parameters {node.name}': _table(
-            ('parameter', 'default', 'unit', 'bounds', 'while it runs', 'meaning'),
-            (_parameter(field) for params in node.parameters for field in fields(params))) for node in EXECUTABLES},
+            ((f'`{topic.name}`', f'`{topic.type}`', topic.doc, _qos(topic)) for topic in topics.values()),
+        ),
+        **{
+            f'parameters {node.name}': _table(
+                ('parameter', 'default', 'unit', 'bounds', 'while it runs', 'meaning'),
+                (_parameter(field) for params in node.parameters for field in fields(params)),
+            )
+            for node in EXECUTABLES
+        },
     }
 
 

@@ -83,8 +83,9 @@ def _read(recording: Recording, name: str) -> tuple[Integers, _Phases]:
         places = [batch.names.index(joint) for joint in _JOINTS]
         numbers = np.stack([batch.position[:, places[:3]], batch.velocity[:, places[:3]]], axis=2)
         runs.append(np.full(batch.messages, run_of(batch.frame)))
-        parts.append(_Phases(batch.stamp_ns, numbers.reshape(batch.messages, 6),
-                             batch.position[:, places[3]].astype(np.int64)))
+        parts.append(
+            _Phases(batch.stamp_ns, numbers.reshape(batch.messages, 6), batch.position[:, places[3]].astype(np.int64))
+        )
     if not parts:
         return np.empty(0, np.int64), _Phases(np.empty(0, np.int64), np.empty((0, 6)), np.empty(0, np.int64))
     return np.concatenate(runs), _Phases(*map(np.concatenate, zip(*parts, strict=True)))
@@ -102,7 +103,8 @@ def _count_equal(told: _Phases, given: _Phases) -> int:
     """Samples that are told and given alike; n counts from wherever each began."""
     place = np.minimum(np.searchsorted(given.stamp_ns, told.stamp_ns), len(given.stamp_ns) - 1)
     same = (given.stamp_ns[place] == told.stamp_ns) & (
-        given.numbers[place].view(np.int64) == np.ascontiguousarray(told.numbers).view(np.int64)).all(axis=1)
+        given.numbers[place].view(np.int64) == np.ascontiguousarray(told.numbers).view(np.int64)
+    ).all(axis=1)
     if not same.any():
         return 0
     offset = (told.step_difference - given.step_difference[place])[same]

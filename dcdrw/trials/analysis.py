@@ -139,8 +139,10 @@ class _Trial:
             self._unreadable = error
             return
         front, rear = batch.names.index(joints.front_joint), batch.names.index(joints.rear_joint)
-        columns = (batch.stamp_ns, *(table[:, wheel] for wheel in (front, rear)
-                                     for table in (batch.position, batch.velocity)))
+        columns = (
+            batch.stamp_ns,
+            *(table[:, wheel] for wheel in (front, rear) for table in (batch.position, batch.velocity)),
+        )
         rows, phases, errors, verdicts = self._follow([column.tolist() for column in columns], run_of(batch.frame))
         if not rows:
             return
@@ -151,15 +153,24 @@ class _Trial:
             known = [table[taken, coupler] for table in (batch.position, batch.velocity, batch.effort)]
         else:
             known = [np.full(len(taken), math.nan)] * 3
-        self._parts.append([
-            batch.stamp_ns[taken], batch.position[taken, front], batch.position[taken, rear], *known,
-            *(column for turns in (front_turns, rear_turns, phis) for column in _columns(turns)),
-            np.array(differences, np.int64), np.array(restarts, np.int64), np.array(errors, float),
-            np.array(verdicts, bool)])
+        self._parts.append(
+            [
+                batch.stamp_ns[taken],
+                batch.position[taken, front],
+                batch.position[taken, rear],
+                *known,
+                *(column for turns in (front_turns, rear_turns, phis) for column in _columns(turns)),
+                np.array(differences, np.int64),
+                np.array(restarts, np.int64),
+                np.array(errors, float),
+                np.array(verdicts, bool),
+            ]
+        )
         self._rows += len(taken)
 
-    def _follow(self, columns: list[list[Any]],
-                run: int) -> tuple[list[int], list[PhaseSample], list[float], list[bool]]:
+    def _follow(
+        self, columns: list[list[Any]], run: int
+    ) -> tuple[list[int], list[PhaseSample], list[float], list[bool]]:
         """Rows that were accepted, and what came of them: phase, error and verdict."""
         taken: list[int] = []
         phases: list[PhaseSample] = []
@@ -196,12 +207,21 @@ class _Trial:
 
     def result(self) -> Analysis:
         """All that there is."""
-        motion = Motion(*(np.concatenate(column) for column in zip(*self._parts, strict=True))) if self._parts else (
-            Motion(*(np.empty(0, kind) for kind in _KINDS)))
+        motion = (
+            Motion(*(np.concatenate(column) for column in zip(*self._parts, strict=True)))
+            if self._parts
+            else (Motion(*(np.empty(0, kind) for kind in _KINDS)))
+        )
         return Analysis(
-            self._params, motion.rows(slice(self._held, None)), motion.rows(slice(self._held)),
-            tuple(self._footfalls), self._monitor.status(), self._estimator.status(), self._received,
-            self._unreadable)
+            self._params,
+            motion.rows(slice(self._held, None)),
+            motion.rows(slice(self._held)),
+            tuple(self._footfalls),
+            self._monitor.status(),
+            self._estimator.status(),
+            self._received,
+            self._unreadable,
+        )
 
 
 def _columns(turns: Sequence[Turn]) -> Floats:
@@ -216,7 +236,10 @@ _KINDS = (np.int64, *[np.float64] * 11, np.int64, np.int64, np.float64, np.bool_
 def _missing(names: Sequence[str], wheels: Sequence[str]) -> str:
     for name in wheels:
         if names.count(name) != 1:
-            what = 'stands twice in the message' if name in names else (
-                f'is missing; the message names {", ".join(names) or "none"}')
+            what = (
+                'stands twice in the message'
+                if name in names
+                else (f'is missing; the message names {", ".join(names) or "none"}')
+            )
             return f'joint {name} {what}'
     return ''

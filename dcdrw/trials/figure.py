@@ -58,8 +58,14 @@ def _broken(angle: Floats, step: float) -> Floats:
 def _draw_angles(axes: Any, trial: Analysis, time: Floats) -> None:
     motion = trial.motion
     for wheel, theta, name in ((FRONT, motion.theta1, 'θ₁ front'), (REAR, motion.theta2, 'θ₂ rear')):
-        axes.plot(time, _broken(theta, math.degrees(trial.pitch)), color=_COLOURS[wheel], label=name, linewidth=1.3,
-                  linestyle='-' if wheel == FRONT else '--')
+        axes.plot(
+            time,
+            _broken(theta, math.degrees(trial.pitch)),
+            color=_COLOURS[wheel],
+            label=name,
+            linewidth=1.3,
+            linestyle='-' if wheel == FRONT else '--',
+        )
     axes.axhline(0.0, color='0.85', zorder=0, linewidth=0.8)
     axes.set_ylabel('stance angle [°]')
     _legend(axes)
@@ -68,14 +74,25 @@ def _draw_angles(axes: Any, trial: Analysis, time: Floats) -> None:
 def _draw_phase(axes: Any, trial: Analysis, time: Floats) -> None:
     step = math.degrees(trial.pitch)
     band = trial.params.sync.band_percent / 100.0 * step
-    axes.axhspan(step / 2 - band, step / 2 + band, color=_BAND, alpha=0.18, linewidth=0,
-                 label=f'±{trial.params.sync.band_percent:g} % of 50 %')
+    axes.axhspan(
+        step / 2 - band,
+        step / 2 + band,
+        color=_BAND,
+        alpha=0.18,
+        linewidth=0,
+        label=f'±{trial.params.sync.band_percent:g} % of 50 %',
+    )
     axes.axhline(step / 2, color=_BAND, linewidth=1)
     axes.plot(time, _broken(trial.motion.phi, step), color=_PHASE, linewidth=1.3, label='φ')
     for fall in trial.footfalls:
         if fall.wheel == FRONT and fall.steps == trial.status.steps_to_synchronization:
-            axes.axvline(_second(trial, fall.stamp_ns), color=_BAND, linestyle=':', linewidth=1.5,
-                         label=f'from step {fall.steps} on')
+            axes.axvline(
+                _second(trial, fall.stamp_ns),
+                color=_BAND,
+                linestyle=':',
+                linewidth=1.5,
+                label=f'from step {fall.steps} on',
+            )
     axes.set_ylim(0.0, step)
     axes.set_ylabel('phase difference φ [°]')
     percent = axes.secondary_yaxis('right', functions=(lambda deg: deg / step * 100, lambda p: p / 100 * step))
@@ -87,13 +104,27 @@ def _draw_gait(axes: Any, trial: Analysis, time: Floats) -> None:
     """Each bar is one stance, from a footfall to the next of that wheel; the legs alternate in shade."""
     end = float(time[-1]) if len(time) else 0.0
     for row, wheel in enumerate((REAR, FRONT)):
-        falls = [(0.0, 0)] + [(_second(trial, fall.stamp_ns), fall.steps)
-                              for fall in trial.footfalls if fall.wheel == wheel]
+        falls = [(0.0, 0)] + [
+            (_second(trial, fall.stamp_ns), fall.steps) for fall in trial.footfalls if fall.wheel == wheel
+        ]
         for (begin, steps), (until, _) in zip(falls, [*falls[1:], (end, 0)], strict=True):
-            axes.barh(row, until - begin, left=begin, height=0.6, color=_COLOURS[wheel],
-                      alpha=0.85 if steps % 2 else 0.35, linewidth=0)
-        axes.plot([time for time, _ in falls[1:]], [row + 0.42] * (len(falls) - 1), 'v', color=_COLOURS[wheel],
-                  markersize=4, clip_on=False)
+            axes.barh(
+                row,
+                until - begin,
+                left=begin,
+                height=0.6,
+                color=_COLOURS[wheel],
+                alpha=0.85 if steps % 2 else 0.35,
+                linewidth=0,
+            )
+        axes.plot(
+            [time for time, _ in falls[1:]],
+            [row + 0.42] * (len(falls) - 1),
+            'v',
+            color=_COLOURS[wheel],
+            markersize=4,
+            clip_on=False,
+        )
     axes.set_yticks((0, 1), (REAR, FRONT))
     axes.set_ylim(-0.4, 1.6)
     axes.set_ylabel('stances')

@@ -64,8 +64,11 @@ class TruthError(NamedTuple):
 
 def truth_error(trial: Analysis, truth: Iterable[JointBatch]) -> TruthError | None:
     """Compare φ with the truth, which is interpolated between its samples; None where they have no time in common."""
-    parts = [(batch.stamp_ns, batch.position[:, [batch.names.index(name) for name in (FRONT_WHEEL, REAR_WHEEL)]])
-             for batch in truth if not batch.error]
+    parts = [
+        (batch.stamp_ns, batch.position[:, [batch.names.index(name) for name in (FRONT_WHEEL, REAR_WHEEL)]])
+        for batch in truth
+        if not batch.error
+    ]
     motion = trial.motion
     if not parts or not len(motion.stamp_ns):
         return None
@@ -78,4 +81,4 @@ def truth_error(trial: Analysis, truth: Iterable[JointBatch]) -> TruthError | No
     alpha1, alpha2 = trial.params.phase.front.alpha, trial.params.phase.rear.alpha
     off = motion.phi[both] / trial.pitch - 0.5 * (psi1 / alpha1 - psi2 / alpha2)
     error = trial.pitch * (off - np.round(off))
-    return TruthError(math.degrees(math.sqrt(float((error ** 2).mean()))), int(both.sum()))
+    return TruthError(math.degrees(math.sqrt(float((error**2).mean()))), int(both.sum()))

@@ -71,28 +71,52 @@ def page(title: str, trials: Sequence['Trial'], tables: Mapping[str, str]) -> st
     """
     downloads = ' · '.join(
         f'<a download="{name}" href="data:text/csv;base64,{base64.b64encode(text.encode()).decode()}">{name}</a>'
-        for name, text in tables.items())
-    overview = (f'<div class="wide">{_table(trials)}</div>\n<p>{downloads}</p>\n'
-                + _figure(_overlay(trials), 'Phase difference at the strikes of the front wheel, dashed where it was '
-                          'measured. 50 % of a step is 25 % of a stride.'))
-    return _PAGE.format(title=html.escape(title), style=_STYLE, overview=overview,
-                        trials='\n'.join(_section(number, trial) for number, trial in enumerate(trials)))
+        for name, text in tables.items()
+    )
+    overview = f'<div class="wide">{_table(trials)}</div>\n<p>{downloads}</p>\n' + _figure(
+        _overlay(trials),
+        'Phase difference at the strikes of the front wheel, dashed where it was '
+        'measured. 50 % of a step is 25 % of a stride.',
+    )
+    return _PAGE.format(
+        title=html.escape(title),
+        style=_STYLE,
+        overview=overview,
+        trials='\n'.join(_section(number, trial) for number, trial in enumerate(trials)),
+    )
 
 
 def _table(trials: Sequence['Trial']) -> str:
-    heads = ('trial', 'source', 'from', 'in step after', 'final band', 'a step leaves', 'tends to', 'k', 'b', 'slope',
-             'verdict')
+    heads = (
+        'trial',
+        'source',
+        'from',
+        'in step after',
+        'final band',
+        'a step leaves',
+        'tends to',
+        'k',
+        'b',
+        'slope',
+        'verdict',
+    )
     units = ('', '', '% of a step', 'steps', '% of a step', '% of the error', '% of a step', 'N/m', 'N·s/m', '°', '')
     rows = [''.join(f'<th>{head}<br><small>{unit}</small></th>' for head, unit in zip(heads, units, strict=True))]
     for number, trial in enumerate(trials):
         status, rig = trial.analysis.status, trial.rig
         low, high = final_band(trial.analysis)
         steps = status.steps_to_synchronization
-        cells = (f'<a href="#trial{number}">{html.escape(trial.name)}</a>', trial.source,
-                 _number(100 * status.initial_phase, 1), '–' if steps is None else str(steps),
-                 f'{_number(50 + low, 1)} to {_number(50 + high, 1)}', _number(100 * trial.decay.ratio, 1),
-                 _number(50 + trial.decay.limit, 1), *map(_short, (rig.k, rig.b, math.degrees(rig.slope))),
-                 _verdict(trial))
+        cells = (
+            f'<a href="#trial{number}">{html.escape(trial.name)}</a>',
+            trial.source,
+            _number(100 * status.initial_phase, 1),
+            '–' if steps is None else str(steps),
+            f'{_number(50 + low, 1)} to {_number(50 + high, 1)}',
+            _number(100 * trial.decay.ratio, 1),
+            _number(50 + trial.decay.limit, 1),
+            *map(_short, (rig.k, rig.b, math.degrees(rig.slope))),
+            _verdict(trial),
+        )
         rows.append(''.join(f'<td>{cell}</td>' for cell in cells))
     return '<table>' + '\n'.join(f'<tr>{row}</tr>' for row in rows) + '</table>'
 
@@ -106,12 +130,16 @@ def _verdict(trial: 'Trial') -> str:
 
 
 def _section(number: int, trial: 'Trial') -> str:
-    about = ''.join(f'<dt>{html.escape(name.replace("_", " "))}</dt><dd>{html.escape(value)}</dd>'
-                    for name, value in trial.about.items())
-    return (f'<h2 id="trial{number}">{html.escape(trial.name)}</h2>\n<p>{html.escape(sentence(trial.analysis))}</p>\n'
-            + (f'<dl>{about}</dl>\n' if about else '')
-            + _figure(_picture(trial), 'Stance angles, phase difference with its band, footfalls and coupler force.')
-            + _figure(_decay(trial), 'Error at each strike of the front wheel, and the geometric decay fitted to it.'))
+    about = ''.join(
+        f'<dt>{html.escape(name.replace("_", " "))}</dt><dd>{html.escape(value)}</dd>'
+        for name, value in trial.about.items()
+    )
+    return (
+        f'<h2 id="trial{number}">{html.escape(trial.name)}</h2>\n<p>{html.escape(sentence(trial.analysis))}</p>\n'
+        + (f'<dl>{about}</dl>\n' if about else '')
+        + _figure(_picture(trial), 'Stance angles, phase difference with its band, footfalls and coupler force.')
+        + _figure(_decay(trial), 'Error at each strike of the front wheel, and the geometric decay fitted to it.')
+    )
 
 
 def _figure(svg: str, caption: str) -> str:
@@ -131,8 +159,16 @@ def _overlay(trials: Sequence['Trial']) -> str:
     axes.axhspan(50 - band, 50 + band, color=_BAND, alpha=0.18, linewidth=0, label=f'±{band:g} % of 50 %')
     for number, trial in enumerate(trials):
         phases = 50.0 + np.array(trial.analysis.status.history)
-        axes.plot(np.arange(1, len(phases) + 1), phases, linestyle='-' if trial.source == 'simulated' else '--',
-                  marker='.', markersize=5, linewidth=1.2, color=_COLOURS[number % len(_COLOURS)], label=trial.name)
+        axes.plot(
+            np.arange(1, len(phases) + 1),
+            phases,
+            linestyle='-' if trial.source == 'simulated' else '--',
+            marker='.',
+            markersize=5,
+            linewidth=1.2,
+            color=_COLOURS[number % len(_COLOURS)],
+            label=trial.name,
+        )
     axes.set(xlabel='steps of the front wheel', ylabel='phase [% of a step]')
     axes.legend(loc='center left', bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
     return _svg(figure)
@@ -147,8 +183,13 @@ def _decay(trial: 'Trial') -> str:
     axes.plot(steps, errors, 'o', color=_COLOURS[0], markersize=4, label='error')
     if not math.isnan(trial.decay.ratio):
         fine = np.linspace(0.0, max(len(errors) - 1, 1), 400)
-        axes.plot(fine + 1, trial.decay(fine), color=_COLOURS[1], linewidth=1.2,
-                  label=f'{trial.decay.limit:+.1f} % {trial.decay.start:+.1f} % · {trial.decay.ratio:.3f}ᵏ')
+        axes.plot(
+            fine + 1,
+            trial.decay(fine),
+            color=_COLOURS[1],
+            linewidth=1.2,
+            label=f'{trial.decay.limit:+.1f} % {trial.decay.start:+.1f} % · {trial.decay.ratio:.3f}ᵏ',
+        )
     axes.set(xlabel='steps of the front wheel', ylabel='error [% of a step]')
     axes.legend(loc='center left', bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
     return _svg(figure)
@@ -156,6 +197,7 @@ def _decay(trial: 'Trial') -> str:
 
 def _axes() -> tuple[Any, Any]:
     from matplotlib.figure import Figure
+
     figure = Figure(figsize=(10, 3.6), layout='constrained')
     axes = figure.subplots()
     axes.spines[['top', 'right']].set_visible(False)
@@ -166,6 +208,7 @@ def _axes() -> tuple[Any, Any]:
 
 def _svg(figure: Any) -> str:
     from matplotlib import rc_context
+
     file = StringIO()
     with rc_context({'svg.fonttype': 'path'}):
         figure.savefig(file, format='svg')
@@ -173,7 +216,7 @@ def _svg(figure: Any) -> str:
 
 
 def _inline(svg: str) -> str:
-    return svg[svg.index('<svg'):]
+    return svg[svg.index('<svg') :]
 
 
 def _number(value: float, digits: int) -> str:

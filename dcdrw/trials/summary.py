@@ -32,8 +32,12 @@ def summarize(trial: Analysis) -> dict[str, Any]:
         'losses_of_synchronization': status.losses,
         'stalled': list(status.stalled),
         'duration_s': _rounded(float(seconds[-1]) if len(seconds) else 0.0),
-        'samples': {'joint_states': trial.joint_states, 'phase_state': len(seconds), 'gaps': status.cadence.gaps,
-                    'lost': status.cadence.lost},
+        'samples': {
+            'joint_states': trial.joint_states,
+            'phase_state': len(seconds),
+            'gaps': status.cadence.gaps,
+            'lost': status.cadence.lost,
+        },
         'parameters': {name: _plain(flatten(values)) for name, values in trial.params._asdict().items()},
     }
 
@@ -46,18 +50,22 @@ def sentence(trial: Analysis) -> str:
     start = 100.0 * status.initial_phase
     low, high = final_band(trial)
     if status.synchronized:
-        return (f'From {start:.1f} % to within ±{band:g} % of 50 % of a step (25 % of a stride) in '
-                f'{status.steps_to_synchronization} steps; in the last ones {50 + low:.1f} to {50 + high:.1f} %.')
+        return (
+            f'From {start:.1f} % to within ±{band:g} % of 50 % of a step (25 % of a stride) in '
+            f'{status.steps_to_synchronization} steps; in the last ones {50 + low:.1f} to {50 + high:.1f} %.'
+        )
     if status.stalled:
         return f'From {start:.1f} %: the {" and the ".join(status.stalled)} wheel stalled after {status.steps} steps.'
     lost = 'Synchronization was lost' if status.lost else 'Not synchronized'
-    return (f'{lost}: from {start:.1f} % to {100.0 * status.phase:.1f} % in {status.steps} steps, '
-            f'outside ±{band:g} % of 50 %.')
+    return (
+        f'{lost}: from {start:.1f} % to {100.0 * status.phase:.1f} % in {status.steps} steps, '
+        f'outside ±{band:g} % of 50 %.'
+    )
 
 
 def final_band(trial: Analysis) -> tuple[float, float]:
     """Least and greatest error over the last `hold_steps` steps of the front wheel [%]; NaN without data."""
-    falls = [fall.stamp_ns for fall in trial.footfalls if fall.wheel == FRONT][-trial.params.sync.hold_steps - 1:]
+    falls = [fall.stamp_ns for fall in trial.footfalls if fall.wheel == FRONT][-trial.params.sync.hold_steps - 1 :]
     errors = trial.motion.error_percent[trial.motion.stamp_ns >= (falls[0] if falls else 0)]
     if np.isnan(errors).all():
         return math.nan, math.nan

@@ -37,15 +37,19 @@ HIDDEN = {'': (), FRONT: (0,), REAR: (1,), BOTH: (0, 1)}
 class LookParams(NamedTuple):
     """What a real camera does to a picture, and what may stand before it."""
 
-    exposure: Annotated[float, Quantity('exposure time, about the stamp: what moves is blurred', 's', low=0.0,
-                                        high=0.1, live=True)] = 0.004
-    blur_px: Annotated[float, Quantity('blur of the lens, one standard deviation', 'px', low=0.0, high=20.0,
-                                       live=True)] = 0.0
-    noise: Annotated[float, Quantity("noise of the sensor, one standard deviation; white is 255", low=0.0, high=50.0,
-                                     live=True)] = 2.0
+    exposure: Annotated[
+        float, Quantity('exposure time, about the stamp: what moves is blurred', 's', low=0.0, high=0.1, live=True)
+    ] = 0.004
+    blur_px: Annotated[
+        float, Quantity('blur of the lens, one standard deviation', 'px', low=0.0, high=20.0, live=True)
+    ] = 0.0
+    noise: Annotated[
+        float, Quantity('noise of the sensor, one standard deviation; white is 255', low=0.0, high=50.0, live=True)
+    ] = 2.0
     brightness: Annotated[float, Quantity('factor; white is clipped', low=0.05, high=4.0, live=True)] = 1.0
-    occlude: Annotated[str, Quantity('whose tags somebody hides who stands before the camera: front, rear, both or '
-                                     'nobody', live=True)] = ''
+    occlude: Annotated[
+        str, Quantity('whose tags somebody hides who stands before the camera: front, rear, both or nobody', live=True)
+    ] = ''
     occlude_from: Annotated[float, Quantity('when, after the first frame', 's', low=0.0, live=True)] = 5.0
     occlude_for: Annotated[float, Quantity('for how long', 's', low=0.0, live=True)] = 0.5
     occlude_every: Annotated[float, Quantity('how often; 0: once', 's', low=0.0, live=True)] = 0.0
@@ -59,7 +63,7 @@ class LookParams(NamedTuple):
 
         """
         if self.occlude not in HIDDEN:
-            raise ValueError(f"occlude must be {', '.join(filter(None, HIDDEN))} or empty, got {self.occlude!r}")
+            raise ValueError(f'occlude must be {", ".join(filter(None, HIDDEN))} or empty, got {self.occlude!r}')
 
     def hidden(self, time: float) -> tuple[int, ...]:
         """Whose tags are hidden at a time after the first frame [s]: 0 the front wheel's, 1 the rear's."""
@@ -72,9 +76,21 @@ class LookParams(NamedTuple):
 # Okabe and Ito's palette, as in the figures.
 _WHEELS: tuple[Colour, Colour] = ((178, 114, 0), (0, 94, 213))
 _HUB, _STEEL, _SPRING, _MARK, _MARK_5, _PERSON = (
-    (62, 60, 58), (120, 116, 112), (84, 84, 90), (128, 162, 190), (44, 66, 96), (58, 50, 48))
+    (62, 60, 58),
+    (120, 116, 112),
+    (84, 84, 90),
+    (128, 162, 190),
+    (44, 66, 96),
+    (58, 50, 48),
+)
 _WALL, _BASE, _FLOOR, _PLANK, _PLANK_SIDE, _NOTHING = (
-    (226, 229, 230), (190, 194, 196), (158, 165, 170), (142, 182, 214), (98, 136, 170), (0, 0, 0))
+    (226, 229, 230),
+    (190, 194, 196),
+    (158, 165, 170),
+    (142, 182, 214),
+    (98, 136, 170),
+    (0, 0, 0),
+)
 _INK, _PAPER = 25, 235
 
 # In the wheels' length ℓ.
@@ -115,8 +131,9 @@ class Renderer:
 
     """
 
-    def __init__(self, scene: SceneParams, view: ViewParams, look: LookParams, tags: TagParams, camera: Camera,
-                 colour: bool) -> None:
+    def __init__(
+        self, scene: SceneParams, view: ViewParams, look: LookParams, tags: TagParams, camera: Camera, colour: bool
+    ) -> None:
         look.check_occluder()
         self._cv2 = opencv()
         self._scene, self._look, self._camera, self._colour = scene, look, camera, colour
@@ -134,10 +151,16 @@ class Renderer:
         pieces = 6 if camera.distortion.any() else 1  # of what is straight but in the picture
         wheels = [_wheel_outlines(shape, self._unit, pieces) for shape in scene.wheels]
         self._wheels = [np.concatenate([points for points, _ in outlines]) for outlines in wheels]
-        front, rear = ([(len(points), _WHEELS[i] if own else _HUB, 0.0) for points, own in outlines]
-                       for i, outlines in enumerate(wheels))
-        self._layout = [*rear, *((len(points), colour, width) for points, colour, width in _coupler(1.0)), *front,
-                        *[(2, _STEEL, 2.0 * _AXLE_RADIUS)] * 2]
+        front, rear = (
+            [(len(points), _WHEELS[i] if own else _HUB, 0.0) for points, own in outlines]
+            for i, outlines in enumerate(wheels)
+        )
+        self._layout = [
+            *rear,
+            *((len(points), colour, width) for points, colour, width in _coupler(1.0)),
+            *front,
+            *[(2, _STEEL, 2.0 * _AXLE_RADIUS)] * 2,
+        ]
         self._background = self._cast()
         if not view.follow:
             self._draw_marks(self._background, self._pose)
@@ -180,13 +203,19 @@ class Renderer:
         """Where the corners of each tag's black square are in the picture, as `corners` orders them, (4, 2) [px]."""
         places = footing.places(*turned(joints, 0.0))
         pose = self.pose(places)
-        return {tag.mount.id: self._camera.project(pose.optical(
-            places[tag.wheel].points(corners(tag.mount), self._scene.tag_plane))) for tag in self._tags}
+        return {
+            tag.mount.id: self._camera.project(
+                pose.optical(places[tag.wheel].points(corners(tag.mount), self._scene.tag_plane))
+            )
+            for tag in self._tags
+        }
 
     def _exposures(self, joints: JointSample) -> int:
         """How often to draw what moves: a wheel's top moves at twice the hub's speed."""
-        fastest = max(abs(speed(turn)) * shape.length
-                      for turn, shape in zip((joints.front, joints.rear), self._scene.wheels, strict=True))
+        fastest = max(
+            abs(speed(turn)) * shape.length
+            for turn, shape in zip((joints.front, joints.rear), self._scene.wheels, strict=True)
+        )
         moved = 2.0 * fastest * self._look.exposure * self._scale
         return min(max(math.ceil(moved / _MOTION_PX), 1), _MOST_EXPOSURES)
 
@@ -194,10 +223,17 @@ class Renderer:
         """Draw from far to near: the rear wheel, the coupler, the front wheel, the axles' ends, the tags."""
         pose, half, plane = self.pose(places), self._scene.wheel_plane, self._scene.tag_plane
         front, rear = places
-        axles = [(place.along, left, place.above) for place, near in ((rear, -half), (front, half))
-                 for left in (near, plane)]
-        points = np.concatenate((rear.points(self._wheels[1], -half), self._coupler_points(rear, front),
-                                 front.points(self._wheels[0], half), axles))
+        axles = [
+            (place.along, left, place.above) for place, near in ((rear, -half), (front, half)) for left in (near, plane)
+        ]
+        points = np.concatenate(
+            (
+                rear.points(self._wheels[1], -half),
+                self._coupler_points(rear, front),
+                front.points(self._wheels[0], half),
+                axles,
+            )
+        )
         self._paint(frame, pose.optical(points), self._layout)
         self._draw_tags(frame, pose, places)
 
@@ -213,7 +249,7 @@ class Renderer:
         """Draw shapes whose points follow each other: how many, the colour, and a line's width [ℓ], or 0 to fill."""
         cv2, pixels, first = self._cv2, np.rint(self._pixels(optical) * (1 << _SHIFT)).astype(np.int32), 0
         for count, colour, width in layout:
-            shape, first = pixels[first:first + count], first + count
+            shape, first = pixels[first : first + count], first + count
             if width:
                 thickness = max(1, round(width * self._unit * self._scale))
                 cv2.polylines(frame, [shape], False, self._ink(colour), thickness, cv2.LINE_AA, _SHIFT)
@@ -233,8 +269,11 @@ class Renderer:
         marks = pose.optical(points)
         depth = marks[..., 2]
         visible = ((depth > 0.1 * unit) & (np.abs(marks[..., :2]).max(axis=-1) < 1.5 * self._sight * depth)).all(axis=1)
-        self._paint(frame, marks[visible].reshape(-1, 3), (
-            (4, _MARK if number % 5 else _MARK_5, 0.0) for number in numbers[visible] for _ in range(2)))
+        self._paint(
+            frame,
+            marks[visible].reshape(-1, 3),
+            ((4, _MARK if number % 5 else _MARK_5, 0.0) for number in numbers[visible] for _ in range(2)),
+        )
 
     def _draw_tags(self, frame: Picture, pose: CameraPose, places: tuple[WheelPlace, WheelPlace]) -> None:
         plane = self._scene.tag_plane
@@ -269,19 +308,38 @@ class Renderer:
         """Draw somebody right before the camera: head and body hide the tags of a wheel."""
         cv2, pose = self._cv2, self.pose(places)
         for wheel in hidden:
-            seen = [self._pixels(pose.optical(places[wheel].points(tag.points[:4], self._scene.tag_plane)))
-                    for tag in self._tags if tag.wheel == wheel]
+            seen = [
+                self._pixels(pose.optical(places[wheel].points(tag.points[:4], self._scene.tag_plane)))
+                for tag in self._tags
+                if tag.wheel == wheel
+            ]
             if not seen:
                 continue
             low, high = np.min(seen, axis=(0, 1)), np.max(seen, axis=(0, 1))
             (x, y), w = 0.5 * (low + high), 0.75 * float((high - low).max())
             shoulder, ink = y - 1.1 * w, self._ink(_PERSON)
-            body = np.array([(x - w, shoulder + 0.5 * w), (x - 0.7 * w, shoulder), (x + 0.7 * w, shoulder),
-                             (x + w, shoulder + 0.5 * w), (x + 0.85 * w, self._camera.height),
-                             (x - 0.85 * w, self._camera.height)])
+            body = np.array(
+                [
+                    (x - w, shoulder + 0.5 * w),
+                    (x - 0.7 * w, shoulder),
+                    (x + 0.7 * w, shoulder),
+                    (x + w, shoulder + 0.5 * w),
+                    (x + 0.85 * w, self._camera.height),
+                    (x - 0.85 * w, self._camera.height),
+                ]
+            )
             cv2.fillPoly(frame, [np.rint(body).astype(np.int32)], ink, cv2.LINE_AA)
-            cv2.ellipse(frame, (round(x), round(shoulder - 0.55 * w)), (round(0.42 * w), round(0.55 * w)),
-                        0.0, 0.0, 360.0, ink, cv2.FILLED, cv2.LINE_AA)
+            cv2.ellipse(
+                frame,
+                (round(x), round(shoulder - 0.55 * w)),
+                (round(0.42 * w), round(0.55 * w)),
+                0.0,
+                0.0,
+                360.0,
+                ink,
+                cv2.FILLED,
+                cv2.LINE_AA,
+            )
 
     def _develop(self, frame: Picture) -> Picture:
         """Lens and sensor."""
@@ -293,13 +351,14 @@ class Renderer:
         if self._noise is not None:
             down, across = self._random.integers(_NOISE_SHIFT, size=2)
             for change, noise in zip((cv2.add, cv2.subtract), self._noise, strict=True):
-                change(frame, noise[down:down + frame.shape[0], across:across + frame.shape[1]], frame)
+                change(frame, noise[down : down + frame.shape[0], across : across + frame.shape[1]], frame)
         return frame
 
     def _make_noise(self) -> tuple[Picture, Picture]:
         height, width, *channels = self._background.shape
         noise = self._look.noise * self._random.standard_normal(
-            (height + _NOISE_SHIFT, width + _NOISE_SHIFT, *channels), dtype=np.float32)
+            (height + _NOISE_SHIFT, width + _NOISE_SHIFT, *channels), dtype=np.float32
+        )
         noise = np.clip(np.rint(noise), -255.0, 255.0)
         return np.maximum(noise, 0.0).astype(np.uint8), np.maximum(-noise, 0.0).astype(np.uint8)
 
@@ -312,8 +371,9 @@ class Renderer:
             changes = np.abs(np.diff(picture, axis=axis)).max(axis=-1) > 6.0
             seam |= np.insert(changes, 0, False, axis=axis) | np.insert(changes, changes.shape[axis], False, axis=axis)
         parts = np.array((-0.375, -0.125, 0.125, 0.375), np.float32)
-        picture[seam] = np.mean([self._surfaces(self._rays[seam] + i * down[seam] + j * across[seam])
-                                 for i in parts for j in parts], axis=0)
+        picture[seam] = np.mean(
+            [self._surfaces(self._rays[seam] + i * down[seam] + j * across[seam]) for i in parts for j in parts], axis=0
+        )
         colours = np.rint(picture).astype(np.uint8)
         return colours if self._colour else np.asarray(self._cv2.cvtColor(colours, self._cv2.COLOR_BGR2GRAY), np.uint8)
 
@@ -331,9 +391,11 @@ class Renderer:
         colours: NDArray[np.float32] = light * np.array(_WALL, np.float32)
         colours[rise < -_FLOOR_BELOW + 0.12] = _BASE
         nearest = np.where(wall > 0.0, wall, np.inf)
-        for colour, far, there in ((_FLOOR, floor, floor > 0.0),
-                                   (_PLANK, top, (top > 0.0) & (np.abs(y0 + top * y) <= _PLANK_HALF)),
-                                   (_PLANK_SIDE, side, (side > 0.0) & (side_z <= 0.0) & (side_z >= -_PLANK_THICK))):
+        for colour, far, there in (
+            (_FLOOR, floor, floor > 0.0),
+            (_PLANK, top, (top > 0.0) & (np.abs(y0 + top * y) <= _PLANK_HALF)),
+            (_PLANK_SIDE, side, (side > 0.0) & (side_z <= 0.0) & (side_z >= -_PLANK_THICK)),
+        ):
             there = there & (far < nearest)
             colours[there] = colour
             nearest = np.where(there, far, nearest)
@@ -364,8 +426,14 @@ class _Tag:
         self._textures: dict[int, Picture] = {}
         square = corners(mount)
         board = square.mean(axis=0) + (square - square.mean(axis=0)) * (1 + 2 * WHITE_BORDER / self.cells)
-        self.points = np.stack((*board, square[0], square[0] + (square[1] - square[0]) / mount.size,
-                                square[0] + (square[3] - square[0]) / mount.size))
+        self.points = np.stack(
+            (
+                *board,
+                square[0],
+                square[0] + (square[1] - square[0]) / mount.size,
+                square[0] + (square[3] - square[0]) / mount.size,
+            )
+        )
         """In the wheel's frame: the corners of the white square, then the upper left one of the black square, and a
         metre from there to the right and down."""
         texels = self.cells * _CELL / mount.size
@@ -377,7 +445,8 @@ class _Tag:
         level = round(math.log(min(max(sigma, 0.1), 2.0 * _CELL)) / 0.1)
         if level not in self._textures:
             self._textures[level] = np.asarray(
-                opencv().GaussianBlur(self._sharp, (0, 0), math.exp(0.1 * level)), np.uint8)
+                opencv().GaussianBlur(self._sharp, (0, 0), math.exp(0.1 * level)), np.uint8
+            )
         return self._textures[level]
 
 

@@ -34,9 +34,17 @@ class SceneParams(NamedTuple):
     rear: WheelShape = WheelShape()
     S0: StanceDistance = math.nan
     slope: Slope = RigParams().slope
-    spacing: Annotated[float, Quantity('from the plane of the rear wheel to that of the front wheel, which is nearer '
-                                       'to the camera: the wheels overlap as seen from the side', 'm', low=0.0,
-                                       live=True, derived='0.2 ℓ')] = math.nan
+    spacing: Annotated[
+        float,
+        Quantity(
+            'from the plane of the rear wheel to that of the front wheel, which is nearer '
+            'to the camera: the wheels overlap as seen from the side',
+            'm',
+            low=0.0,
+            live=True,
+            derived='0.2 ℓ',
+        ),
+    ] = math.nan
 
     @property
     def wheels(self) -> tuple[WheelShape, WheelShape]:
@@ -62,37 +70,88 @@ class SceneParams(NamedTuple):
 class ViewParams(NamedTuple):
     """The camera and its tripod."""
 
-    camera: Annotated[str, Quantity('camera_info file (as config/camera.yaml); where none is named, the next five '
-                                    'parameters make the camera')] = ''
+    camera: Annotated[
+        str,
+        Quantity(
+            'camera_info file (as config/camera.yaml); where none is named, the next five parameters make the camera'
+        ),
+    ] = ''
     image_width: Annotated[int, Quantity('width of the picture', 'px', low=16, high=8192)] = 1280
     image_height: Annotated[int, Quantity('height of the picture', 'px', low=16, high=8192)] = 720
     field_of_view_deg: Annotated[float, Quantity('angle of view across the width', '°', low=5.0, high=120.0)] = 60.0
     k1: Annotated[float, Quantity('radial distortion of the lens, of the second order', low=-1.0, high=1.0)] = 0.0
     k2: Annotated[float, Quantity('radial distortion of the lens, of the fourth order', low=-1.0, high=1.0)] = 0.0
-    distance: Annotated[float, Quantity("level distance from the middle between the wheels' planes", 'm', above=0.0,
-                                        live=True, derived='3.8 ℓ, so that the pair fills the picture')] = math.nan
-    height: Annotated[float, Quantity('of the camera above the slope where it aims', 'm', low=0.0, high=20.0,
-                                      live=True, derived='as high as the hubs')] = math.nan
-    pan_deg: Annotated[float, Quantity('oblique view: how far the tripod stands to the downhill side, seen from where '
-                                       'it aims; 0 is face-on', '°', low=-75.0, high=75.0, live=True)] = 0.0
-    tilt_deg: Annotated[float, Quantity('how far the camera looks down', '°', low=-80.0, high=80.0, live=True,
-                                        derived='at the hubs')] = math.nan
-    roll_deg: Annotated[float, Quantity('how far the camera leans to its right', '°', low=-180.0, high=180.0,
-                                        live=True)] = 0.0
-    follow: Annotated[bool, Quantity('move along the slope with the pair, as on a dolly, or beside a treadmill; else '
-                                     'the tripod stands, and the pair passes by', live=True)] = True
-    place: Annotated[float, Quantity("where a standing camera aims, down the slope from the rear wheel's first "
-                                     'foothold', 'm', low=-1e3, high=1e3, live=True, derived='2 ℓ')] = math.nan
+    distance: Annotated[
+        float,
+        Quantity(
+            "level distance from the middle between the wheels' planes",
+            'm',
+            above=0.0,
+            live=True,
+            derived='3.8 ℓ, so that the pair fills the picture',
+        ),
+    ] = math.nan
+    height: Annotated[
+        float,
+        Quantity(
+            'of the camera above the slope where it aims',
+            'm',
+            low=0.0,
+            high=20.0,
+            live=True,
+            derived='as high as the hubs',
+        ),
+    ] = math.nan
+    pan_deg: Annotated[
+        float,
+        Quantity(
+            'oblique view: how far the tripod stands to the downhill side, seen from where it aims; 0 is face-on',
+            '°',
+            low=-75.0,
+            high=75.0,
+            live=True,
+        ),
+    ] = 0.0
+    tilt_deg: Annotated[
+        float, Quantity('how far the camera looks down', '°', low=-80.0, high=80.0, live=True, derived='at the hubs')
+    ] = math.nan
+    roll_deg: Annotated[
+        float, Quantity('how far the camera leans to its right', '°', low=-180.0, high=180.0, live=True)
+    ] = 0.0
+    follow: Annotated[
+        bool,
+        Quantity(
+            'move along the slope with the pair, as on a dolly, or beside a treadmill; else '
+            'the tripod stands, and the pair passes by',
+            live=True,
+        ),
+    ] = True
+    place: Annotated[
+        float,
+        Quantity(
+            "where a standing camera aims, down the slope from the rear wheel's first foothold",
+            'm',
+            low=-1e3,
+            high=1e3,
+            live=True,
+            derived='2 ℓ',
+        ),
+    ] = math.nan
 
     def resolved(self, scene: SceneParams) -> 'ViewParams':
         """The same view with the derived defaults filled in."""
         height = scene.hub_height if math.isnan(self.height) else self.height
         distance = 3.8 * scene.hub_height if math.isnan(self.distance) else self.distance
         return self._replace(
-            height=height, distance=distance,
-            tilt_deg=(math.degrees(math.atan2(height - scene.hub_height, distance)) if math.isnan(self.tilt_deg)
-                      else self.tilt_deg),
-            place=2.0 * scene.hub_height if math.isnan(self.place) else self.place)
+            height=height,
+            distance=distance,
+            tilt_deg=(
+                math.degrees(math.atan2(height - scene.hub_height, distance))
+                if math.isnan(self.tilt_deg)
+                else self.tilt_deg
+            ),
+            place=2.0 * scene.hub_height if math.isnan(self.place) else self.place,
+        )
 
     def make_camera(self) -> Camera:
         """The camera.
@@ -134,11 +193,13 @@ class Footing:
     def __init__(self, scene: SceneParams, first: JointSample) -> None:
         front, rear = scene.wheels
         (self._steps1, theta1), (self._steps2, theta2) = (
-            _stance(shape, turn.angle) for shape, turn in zip(scene.wheels, (first.front, first.rear), strict=True))
+            _stance(shape, turn.angle) for shape, turn in zip(scene.wheels, (first.front, first.rear), strict=True)
+        )
         length, rise = first.coupler.length, front.length * math.cos(theta1) - rear.length * math.cos(theta2)
         if abs(rise) < length < LONGEST * (front.length + rear.length):
-            self._ahead = (math.sqrt(length**2 - rise**2) - front.length * math.sin(theta1)
-                           + rear.length * math.sin(theta2))
+            self._ahead = (
+                math.sqrt(length**2 - rise**2) - front.length * math.sin(theta1) + rear.length * math.sin(theta2)
+            )
         else:
             n = theta1 / front.alpha < theta2 / rear.alpha
             self._ahead = (front.length if math.isnan(scene.S0) else scene.S0) + n * front.step_length
@@ -193,8 +254,9 @@ def camera_pose(scene: SceneParams, view: ViewParams) -> CameraPose:
     forward = -math.cos(tilt) * outward - math.sin(tilt) * up
     right = np.array((-math.cos(pan), math.sin(pan), 0.0))
     down = np.cross(forward, right)
-    axes = np.stack((math.cos(roll) * right + math.sin(roll) * down, math.cos(roll) * down - math.sin(roll) * right,
-                     forward))
+    axes = np.stack(
+        (math.cos(roll) * right + math.sin(roll) * down, math.cos(roll) * down - math.sin(roll) * right, forward)
+    )
     cos, sin = math.cos(scene.slope), math.sin(scene.slope)
     slope_axes = np.array(((cos, 0.0, -sin), (0.0, 1.0, 0.0), (sin, 0.0, cos)))
     return CameraPose(axes @ slope_axes.T, slope_axes @ (view.distance * outward + view.height * up))

@@ -79,5 +79,10 @@ def between(earlier: JointSample, later: JointSample, stamp_ns: int) -> JointSam
         rate = mix(a.rate, b.rate)
         return Turn(mix(a.angle, b.angle), rate if math.isfinite(rate) else (b.angle - a.angle) / span_ns * SECOND)
 
-    return JointSample(stamp_ns, turn(earlier.front, later.front), turn(earlier.rear, later.rear),
-                       CouplerSample(*map(mix, earlier.coupler, later.coupler)), later.run)
+    return JointSample(
+        stamp_ns,
+        turn(earlier.front, later.front),
+        turn(earlier.rear, later.rear),
+        CouplerSample(*map(mix, earlier.coupler, later.coupler)),
+        later.run,
+    )

@@ -54,12 +54,15 @@ class VirtualCameraNode(Node):
         report(self, self._diagnose)
         listen(self, JOINT_STATES, self._on_joints)
         self.create_timer(1.0 / (LOOKS_PER_FRAME * params.frame_rate), self._take_frame, clock=steady_clock())
-        self.get_logger().info(f'waiting for joint_states, to draw {self._camera.width}x{self._camera.height} '
-                               f'{params.encoding} at {params.frame_rate:g} Hz')
+        self.get_logger().info(
+            f'waiting for joint_states, to draw {self._camera.width}x{self._camera.height} '
+            f'{params.encoding} at {params.frame_rate:g} Hz'
+        )
 
     def _make_renderer(self) -> Renderer:
-        return Renderer(self._scene.value, self._view.value, self._look.value, self._tags.value, self._camera,
-                        self._colour)
+        return Renderer(
+            self._scene.value, self._view.value, self._look.value, self._tags.value, self._camera, self._colour
+        )
 
     def _outdate(self) -> None:
         """Let the next frame be drawn by the changed parameters: several may change at once."""
@@ -91,13 +94,20 @@ class VirtualCameraNode(Node):
         shutter = self._shutter
         drawn, dropped = shutter.taken - self._told[0], shutter.dropped - self._told[1]
         self._told = shutter.taken, shutter.dropped
-        values = {'frames drawn': str(shutter.taken), 'frames dropped': str(shutter.dropped),
-                  'frames drawn since the last report': str(drawn)}
+        values = {
+            'frames drawn': str(shutter.taken),
+            'frames dropped': str(shutter.dropped),
+            'frames drawn since the last report': str(drawn),
+        }
         if self._age.seconds > STALE_AFTER:
             return Diagnosis(Level.STALE, 'no joint_states', values)
         if dropped > MANY_DROPPED * drawn:
-            return Diagnosis(Level.WARN, f'{dropped} frames dropped since the last report: drawing is slower than '
-                             'frame_rate, or joint_states come more rarely', values)
+            return Diagnosis(
+                Level.WARN,
+                f'{dropped} frames dropped since the last report: drawing is slower than '
+                'frame_rate, or joint_states come more rarely',
+                values,
+            )
         return Diagnosis(Level.OK, 'filming', values)
 
 

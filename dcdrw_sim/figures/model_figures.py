@@ -17,20 +17,33 @@ BLUE, ORANGE, VERMILION, GREEN, BLACK = '#0072B2', '#E69F00', '#D55E00', '#009E7
 _ROLLS, _STANDS = '#DCEFFA', '0.62'
 
 
-def draw_basin(axes: Any, wheel: WheelParams, slope: float, gravity: float,
-               pixels: tuple[int, int] = (120, 600)) -> None:
+def draw_basin(
+    axes: Any, wheel: WheelParams, slope: float, gravity: float, pixels: tuple[int, int] = (120, 600)
+) -> None:
     """Angle and speed from which a single wheel comes to roll, or to stand, with the limit cycle drawn in."""
     unit, alpha = math.sqrt(gravity / wheel.length), wheel.alpha
     thetas, omegas = np.linspace(-alpha, alpha, pixels[0]), np.linspace(-unit, 0.8 * unit, pixels[1])
     rolls = [[fate(wheel, slope, gravity, theta, omega) is Fate.ROLLS for theta in thetas] for omega in omegas]
-    axes.contourf(np.degrees(thetas), omegas, np.array(rolls, float), levels=[-0.5, 0.5, 1.5],
-                  colors=[_STANDS, _ROLLS])
+    axes.contourf(np.degrees(thetas), omegas, np.array(rolls, float), levels=[-0.5, 0.5, 1.5], colors=[_STANDS, _ROLLS])
     angles = np.linspace(-alpha, alpha, 100)
-    axes.plot(np.degrees(angles), limit_cycle_speed(wheel, slope, gravity, angles), color=BLUE, linewidth=2,
-              label='limit cycle')
+    axes.plot(
+        np.degrees(angles),
+        limit_cycle_speed(wheel, slope, gravity, angles),
+        color=BLUE,
+        linewidth=2,
+        label='limit cycle',
+    )
     rest = slope < alpha
-    axes.plot(np.degrees([-alpha, alpha]) if rest else [], [0.0, 0.0] if rest else [], 's', color=BLACK, markersize=7,
-              clip_on=False, zorder=5, label='at rest on two spokes')
+    axes.plot(
+        np.degrees([-alpha, alpha]) if rest else [],
+        [0.0, 0.0] if rest else [],
+        's',
+        color=BLACK,
+        markersize=7,
+        clip_on=False,
+        zorder=5,
+        label='at rest on two spokes',
+    )
     axes.plot([], [], 's', color=_ROLLS, markersize=10, markeredgecolor='0.5', label='comes to roll')
     axes.plot([], [], 's', color=_STANDS, markersize=10, markeredgecolor='0.5', label='comes to stand')
     axes.set_xlim(*np.degrees([-alpha, alpha]))
@@ -46,14 +59,28 @@ def draw_wheel_speed(axes: Any, wheel: WheelParams, slope: float, gravity: float
     slopes = np.concatenate([least + np.geomspace(1e-9, 1e-3, 40), np.linspace(least + 2e-3, end, 120)])
     speeds = np.array([limit_cycle_velocity(wheel, value, gravity) for value in slopes])
     axes.plot(np.degrees(slopes), speeds, color=BLUE, linewidth=2)
-    for value, text, style in ((least, 'rolls from here on', '--'), (most, 'a real foot would lift off', ':'),
-                               (wheel.alpha, 'cannot stand any more', '-.')):
-        axes.axvline(math.degrees(value), color='0.35', linestyle=style, linewidth=1.2,
-                     label=f'{math.degrees(value):.2f}°: {text}')
+    for value, text, style in (
+        (least, 'rolls from here on', '--'),
+        (most, 'a real foot would lift off', ':'),
+        (wheel.alpha, 'cannot stand any more', '-.'),
+    ):
+        axes.axvline(
+            math.degrees(value),
+            color='0.35',
+            linestyle=style,
+            linewidth=1.2,
+            label=f'{math.degrees(value):.2f}°: {text}',
+        )
     here = limit_cycle_velocity(wheel, slope, gravity)
     if not math.isnan(here):
-        axes.plot(math.degrees(slope), here, 'o', color=VERMILION, markersize=7,
-                  label=f'{math.degrees(slope):.2f}°: {here:.3f} m/s')
+        axes.plot(
+            math.degrees(slope),
+            here,
+            'o',
+            color=VERMILION,
+            markersize=7,
+            label=f'{math.degrees(slope):.2f}°: {here:.3f} m/s',
+        )
     axes.set_xlim(0.0, math.degrees(end))
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel('slope γ [°]')
@@ -75,19 +102,38 @@ def draw_speed(axes: Any, rig: RigParams, coupled: tuple[float, float] | None = 
 
     """
     phases = np.linspace(NEAR_TOGETHER, 1.0 - NEAR_TOGETHER, points)
-    axes.plot(100.0 * phases, [RigidPair(rig, phase).gait().velocity for phase in phases], color=BLUE, linewidth=2,
-              label='rigid bar')
+    axes.plot(
+        100.0 * phases,
+        [RigidPair(rig, phase).gait().velocity for phase in phases],
+        color=BLUE,
+        linewidth=2,
+        label='rigid bar',
+    )
     best = fastest_phase(rig)
     top = RigidPair(rig, best).gait().velocity
-    axes.plot(100.0 * best, top, 'D', color=VERMILION, markersize=7,
-              label=f'fastest: {top:.3f} m/s at {100 * best:.1f} %')
+    axes.plot(
+        100.0 * best, top, 'D', color=VERMILION, markersize=7, label=f'fastest: {top:.3f} m/s at {100 * best:.1f} %'
+    )
     together = RigidPair(rig, 0.0).gait().velocity
     if not math.isnan(together):
-        axes.plot([0.0, 100.0], [together] * 2, 'o', color=BLACK, markersize=6, clip_on=False,
-                  label=f'both strike at once: {together:.3f} m/s')
+        axes.plot(
+            [0.0, 100.0],
+            [together] * 2,
+            'o',
+            color=BLACK,
+            markersize=6,
+            clip_on=False,
+            label=f'both strike at once: {together:.3f} m/s',
+        )
     if coupled:
-        axes.plot(100.0 * coupled[0], coupled[1], '*', color=GREEN, markersize=13,
-                  label=f'spring and damper: {coupled[1]:.3f} m/s at {100 * coupled[0]:.1f} %')
+        axes.plot(
+            100.0 * coupled[0],
+            coupled[1],
+            '*',
+            color=GREEN,
+            markersize=13,
+            label=f'spring and damper: {coupled[1]:.3f} m/s at {100 * coupled[0]:.1f} %',
+        )
     _phase_axis(axes)
     axes.set_ylabel('mean speed [m/s]')
 
@@ -106,16 +152,32 @@ def draw_energy(axes: Any, rig: RigParams, points: int = 33) -> None:
     if math.isnan(velocity):
         raise ValueError(f'slope {math.degrees(rig.slope):.4g}° is too gentle for the rigid pair at 50 %')
     phases = np.linspace(NEAR_TOGETHER, 1.0 - NEAR_TOGETHER, points)
-    axes.plot(100.0 * phases, [_cost(rig, phase, velocity) for phase in phases], color=BLUE, linewidth=2,
-              label=f'rigid bar, at {velocity:.3f} m/s')
-    axes.plot([0.0, 100.0], [_cost(rig, 0.0, velocity)] * 2, 'o', color=BLACK, markersize=6, clip_on=False,
-              label='both strike at once')
+    axes.plot(
+        100.0 * phases,
+        [_cost(rig, phase, velocity) for phase in phases],
+        color=BLUE,
+        linewidth=2,
+        label=f'rigid bar, at {velocity:.3f} m/s',
+    )
+    axes.plot(
+        [0.0, 100.0],
+        [_cost(rig, 0.0, velocity)] * 2,
+        'o',
+        color=BLACK,
+        markersize=6,
+        clip_on=False,
+        label='both strike at once',
+    )
     _phase_axis(axes)
     axes.set_ylabel('energy lost per metre [J/m]')
     weight = energy_per_metre(rig._replace(slope=math.pi / 2))
-    slope = axes.secondary_yaxis('right', functions=(
-        lambda cost: np.degrees(np.arcsin(np.clip(cost / weight, -1.0, 1.0))),
-        lambda degrees: weight * np.sin(np.radians(degrees))))
+    slope = axes.secondary_yaxis(
+        'right',
+        functions=(
+            lambda cost: np.degrees(np.arcsin(np.clip(cost / weight, -1.0, 1.0))),
+            lambda degrees: weight * np.sin(np.radians(degrees)),
+        ),
+    )
     slope.set_ylabel('slope that it takes [°]')
 
 
@@ -125,8 +187,16 @@ def draw_hildebrand(axes: Any, contacts: Sequence[Contact], unit: str = 'stride'
     for contact in contacts:
         front, left = contact.foot in (1, 2), contact.foot in (1, 3)
         y = rows.index(contact.foot)
-        axes.barh(y, contact.end - contact.start, left=contact.start, height=0.62, color=BLUE if front else ORANGE,
-                  edgecolor=BLACK, linewidth=0.8, hatch='' if left else '///')
+        axes.barh(
+            y,
+            contact.end - contact.start,
+            left=contact.start,
+            height=0.62,
+            color=BLUE if front else ORANGE,
+            edgecolor=BLACK,
+            linewidth=0.8,
+            hatch='' if left else '///',
+        )
         axes.text(contact.start, y + 0.34, f' {contact.foot}', va='bottom', ha='left', fontsize=9, clip_on=True)
     axes.set_yticks(range(4), [f'{FEET[foot]} {foot}' for foot in rows])
     axes.set_ylim(-0.5, 3.75)

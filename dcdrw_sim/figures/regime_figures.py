@@ -23,7 +23,8 @@ REGIMES = (
     ('walks in step', '#86BAE0', (Verdict.SETTLES,)),
     ('walks, undecided when time is over', '#F0E442', (Verdict.ENTERS, Verdict.UNDECIDED)),
     ('walks beside the goal', '#F4C27A', (Verdict.ELSEWHERE,)),
-    ('stalls', '0.55', (Verdict.STALLS, Verdict.STANDS, Verdict.FALLS, Verdict.COLLIDES, Verdict.RACES)))
+    ('stalls', '0.55', (Verdict.STALLS, Verdict.STANDS, Verdict.FALLS, Verdict.COLLIDES, Verdict.RACES)),
+)
 """Name, colour, and the verdicts that make them; lightness tells them apart, too."""
 CURVE_POINTS = 41
 """Of a boundary."""
@@ -39,6 +40,7 @@ def draw_coupler_regimes(axes: Any, dataset: Any, shorter: float | None = None) 
 
     """
     from dcdrw_sim.study.sweep_dataset import sweep_of
+
     rig = sweep_of(dataset).rig.resolved()
     _draw_regimes(axes, dataset.k, dataset.b, dataset.verdict.values.T)
     ks = np.geomspace(float(dataset.k[0]), float(dataset.k[-1]), CURVE_POINTS)
@@ -46,14 +48,28 @@ def draw_coupler_regimes(axes: Any, dataset: Any, shorter: float | None = None) 
     axes.plot(ks, low.values, color=BLACK, linewidth=2, label='the limit cycle ends: fold')
     axes.plot(ks, high.values, color=BLACK, linewidth=2)
     theta2 = np.degrees(dataset.cycle_theta2.values.T)
-    axes.contour(dataset.k, dataset.b, abs(theta2), levels=[math.degrees(dataset.attrs['band'])], colors=VERMILION,
-                 linestyles='--', linewidths=1.5)
-    axes.plot([], [], '--', color=VERMILION, linewidth=1.5,
-              label=f'its θ₂ is ±{math.degrees(dataset.attrs["band"]):g}° at the section')
+    axes.contour(
+        dataset.k,
+        dataset.b,
+        abs(theta2),
+        levels=[math.degrees(dataset.attrs['band'])],
+        colors=VERMILION,
+        linestyles='--',
+        linewidths=1.5,
+    )
+    axes.plot(
+        [],
+        [],
+        '--',
+        color=VERMILION,
+        linewidth=1.5,
+        label=f'its θ₂ is ±{math.degrees(dataset.attrs["band"]):g}° at the section',
+    )
     if shorter:
         late = np.where(np.isfinite(dataset.time.values), dataset.time.values, 1e3 * shorter).T
-        axes.contour(dataset.k, dataset.b, np.log(late / shorter), levels=[0.0], colors=BLUE, linestyles=':',
-                     linewidths=2)
+        axes.contour(
+            dataset.k, dataset.b, np.log(late / shorter), levels=[0.0], colors=BLUE, linestyles=':', linewidths=2
+        )
         axes.plot([], [], ':', color=BLUE, linewidth=2, label=f'in step after {shorter:g} time units')
     label_coupler_axes(axes, dataset)
 
@@ -67,6 +83,7 @@ def draw_slope_regimes(axes: Any, dataset: Any) -> None:
 
     """
     from dcdrw_sim.study.sweep_dataset import sweep_of
+
     rig = sweep_of(dataset).rig.resolved()
     _draw_regimes(axes, dataset.slope_deg, dataset.b, dataset.verdict.values.T)
     bs = np.geomspace(float(dataset.b[0]), float(dataset.b[-1]), CURVE_POINTS)
@@ -76,11 +93,25 @@ def draw_slope_regimes(axes: Any, dataset: Any) -> None:
     closed = [gentlest_even_gait(plain.front.alpha, plain.k, b / scales.damping).slope for b in bs]
     axes.plot(np.degrees(closed), bs, '--', color=BLUE, linewidth=1.5, label='the same in closed form')
     worst, slope = steepest_stall(rig)
-    axes.plot(math.degrees(slope), worst, 'D', color=VERMILION, markersize=7,
-              label=f'steeper than {math.degrees(slope):.3f}° no damper stalls')
+    axes.plot(
+        math.degrees(slope),
+        worst,
+        'D',
+        color=VERMILION,
+        markersize=7,
+        label=f'steeper than {math.degrees(slope):.3f}° no damper stalls',
+    )
     alone = math.degrees(gentlest_slope(rig.front))
-    axes.axvspan(0.0, alone, facecolor='none', edgecolor='0.8', hatch='xx', linewidth=0, zorder=0,
-                 label=f'below {alone:.3f}° no wheel rolls by itself')
+    axes.axvspan(
+        0.0,
+        alone,
+        facecolor='none',
+        edgecolor='0.8',
+        hatch='xx',
+        linewidth=0,
+        zorder=0,
+        label=f'below {alone:.3f}° no wheel rolls by itself',
+    )
     axes.set_yscale('log')
     axes.set_xlim(0.0, float(dataset.slope_deg[-1]))
     axes.set_ylim(bs[0], bs[-1])
@@ -99,6 +130,7 @@ def draw_basin(axes: Any, rig: RigParams, basin: Basin, edge: tuple[Floats, Floa
 
     """
     from matplotlib.colors import ListedColormap
+
     phases, percent = 100.0 * basin.phases, 100.0 * basin.speeds
     stalls = np.where(basin.verdicts >= Verdict.STALLS, 1.0, math.nan)
     mesh = axes.pcolormesh(phases, percent, basin.steps.T, cmap='cividis_r', vmin=0.0, rasterized=True)
@@ -125,8 +157,16 @@ def label_regimes(axes: Any, **where: Any) -> None:
 
 def _draw_regimes(axes: Any, x: Any, y: Any, verdicts: NDArray[np.int8]) -> None:
     from matplotlib.colors import ListedColormap
+
     regimes = np.zeros(verdicts.shape)
     for number, (_, _, members) in enumerate(REGIMES):
         regimes[np.isin(verdicts, members)] = number
-    axes.pcolormesh(x, y, regimes, cmap=ListedColormap([colour for _, colour, _ in REGIMES]), vmin=-0.5,
-                    vmax=len(REGIMES) - 0.5, rasterized=True)
+    axes.pcolormesh(
+        x,
+        y,
+        regimes,
+        cmap=ListedColormap([colour for _, colour, _ in REGIMES]),
+        vmin=-0.5,
+        vmax=len(REGIMES) - 0.5,
+        rasterized=True,
+    )

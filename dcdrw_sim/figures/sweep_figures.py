@@ -20,8 +20,10 @@ from dcdrw_sim.study.verdict import Verdict
 Floats = NDArray[np.float64]
 
 EIGENVALUES = {
-    'raw_eigenvalues': "the paper's regression (raw)", 'affine_eigenvalues': 'regression with an offset',
-    'multipliers': 'exact multiplier'}
+    'raw_eigenvalues': "the paper's regression (raw)",
+    'affine_eigenvalues': 'regression with an offset',
+    'multipliers': 'exact multiplier',
+}
 """What can be drawn over k and b, and its name."""
 STARTS = (BLUE, VERMILION, GREEN, ORANGE, '#56B4E9', '#CC79A7', BLACK, '#999999', '#882255')
 """Colours of the starts: Okabe and Ito's, and one more."""
@@ -62,6 +64,7 @@ def best_coupler(dataset: Any) -> Best:
 def draw_trajectories(axes: Any, dataset: Any) -> None:
     """θ2 at the section, step by step, of every start of every valid coupler, coloured by where it starts."""
     from matplotlib.collections import LineCollection
+
     motions = np.degrees(dataset.section_theta2.values[is_valid(dataset)])
     steps = np.arange(motions.shape[-1])
     for start, phase in enumerate(dataset.start.values.tolist()):
@@ -82,8 +85,9 @@ def draw_eigenvalues(axes: Any, dataset: Any, name: str, norm: Any) -> Any:
     """The largest modulus of a set of EIGENVALUES at every valid coupler; returns what a colour bar needs."""
     moduli = dataset[name].values[:, :, 0]
     shown = is_valid(dataset) & np.isfinite(moduli)
-    mesh = axes.pcolormesh(dataset.k, dataset.b, np.where(shown, moduli, math.nan).T, norm=norm, cmap='cividis',
-                           rasterized=True)
+    mesh = axes.pcolormesh(
+        dataset.k, dataset.b, np.where(shown, moduli, math.nan).T, norm=norm, cmap='cividis', rasterized=True
+    )
     stalls = dataset.verdict.values >= Verdict.STALLS
     axes.contourf(dataset.k, dataset.b, stalls.T.astype(float), levels=[0.5, 1.5], colors='none', hatches=['///'])
     axes.set_facecolor('0.93')
@@ -120,8 +124,11 @@ def draw_best(axes: Any, dataset: Any, form: str) -> Regression:
     _draw_band(axes, dataset.attrs['band'])
     axes.set_xlabel('steps of the front wheel')
     axes.set_ylabel('θ₂ at the section [°]')
-    axes.set_title(f'k̂ = {best.k:.3g}, b̂ = {best.b:.3g}: eigenvalue {abs(found.eigenvalues[0]):.4f}, '
-                   f'multiplier {best.multiplier:.4f}', fontsize=10)
+    axes.set_title(
+        f'k̂ = {best.k:.3g}, b̂ = {best.b:.3g}: eigenvalue {abs(found.eigenvalues[0]):.4f}, '
+        f'multiplier {best.multiplier:.4f}',
+        fontsize=10,
+    )
     axes.legend(loc='upper right', frameon=False)
     return found
 
@@ -134,8 +141,7 @@ def predict(regression: Regression, start: Floats, count: int) -> Floats:
     return np.array(states)
 
 
-def draw_experiment(angles: Any, phase: Any, rig: RigParams, start: State, seconds: float,
-                    band_percent: float) -> None:
+def draw_experiment(angles: Any, phase: Any, rig: RigParams, start: State, seconds: float, band_percent: float) -> None:
     """Stance angles and phase difference φ against time, as the paper shows those of its trials.
 
     Args:
@@ -150,13 +156,21 @@ def draw_experiment(angles: Any, phase: Any, rig: RigParams, start: State, secon
     motion = run(rig, start, seconds).at(np.linspace(0.0, seconds, SAMPLES))
     pitch = math.degrees(rig.front.alpha + rig.rear.alpha)
     for theta, colour, style, name in (
-            (motion.theta1, BLUE, '-', 'θ₁ front'), (motion.theta2, VERMILION, '--', 'θ₂ rear')):
+        (motion.theta1, BLUE, '-', 'θ₁ front'),
+        (motion.theta2, VERMILION, '--', 'θ₂ rear'),
+    ):
         angles.plot(motion.time, _broken(np.degrees(theta), pitch), color=colour, linestyle=style, label=name)
     angles.set_ylabel('stance angle [°]')
     turns = motion.rotation1 / (2.0 * rig.front.alpha) - motion.rotation2 / (2.0 * rig.rear.alpha)
     band = band_percent / 100.0 * pitch
-    phase.axhspan(0.5 * pitch - band, 0.5 * pitch + band, color=GREEN, alpha=0.18, linewidth=0,
-                  label=f'±{band_percent:g} % (±{band:g}°) of 50 %')
+    phase.axhspan(
+        0.5 * pitch - band,
+        0.5 * pitch + band,
+        color=GREEN,
+        alpha=0.18,
+        linewidth=0,
+        label=f'±{band_percent:g} % (±{band:g}°) of 50 %',
+    )
     phase.plot(motion.time, _broken((turns % 1.0) * pitch, pitch), color=BLACK, label='φ')
     phase.set_ylim(0.0, pitch)
     phase.set_ylabel('phase difference φ [°]')

@@ -93,8 +93,12 @@ def find_limit_cycles(rigs: Rigs, starts: Floats) -> LimitCycles:
     """
     count, unit = len(starts), np.sqrt(rigs.gravity / rigs.front.length)
     scales = np.column_stack([unit, np.ones(count), unit])
-    found = LimitCycles(np.full((count, 3), math.nan), np.full((count, 3, 3), math.nan), np.full(count, math.nan),
-                        np.full(count, math.nan))
+    found = LimitCycles(
+        np.full((count, 3), math.nan),
+        np.full((count, 3, 3), math.nan),
+        np.full(count, math.nan),
+        np.full(count, math.nan),
+    )
     sigma1, sigma2 = _step_length(rigs.front), _step_length(rigs.rear)
     sought = np.flatnonzero(np.isfinite(starts).all(axis=1) & (abs(sigma1 - sigma2) <= EQUAL * sigma1))
     here = np.array(starts, float)
@@ -156,8 +160,13 @@ def step_maps(rigs: Rigs, states: Floats, which: NDArray[np.intp]) -> _Steps:
     some, states = take(some, possible), states[possible]
     motion = run_pairs(some, np.column_stack([some.front.alpha, states]), math.inf, 3, strict=False)
     first, rear, last = motion.strikes.T
-    returns = ((motion.ends == End.STRIKES) & (motion.strikes['direction'] == FORWARD).all(axis=1)
-               & (first['wheel'] == 1) & (rear['wheel'] == 2) & (last['wheel'] == 1))
+    returns = (
+        (motion.ends == End.STRIKES)
+        & (motion.strikes['direction'] == FORWARD).all(axis=1)
+        & (first['wheel'] == 1)
+        & (rear['wheel'] == 2)
+        & (last['wheel'] == 1)
+    )
     result = _Steps(*(np.full(shape, math.nan) for shape in ((len(which), 3), len(which), len(which))))
     at = np.flatnonzero(possible)[returns]
     result.states[at], result.periods[at] = last['state'][returns, 1:], last['t'][returns]

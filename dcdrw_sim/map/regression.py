@@ -90,8 +90,9 @@ def fit_raw(trajectories: Iterable[ArrayLike], tolerance: float = RANK_TOLERANCE
     return _fit(before, after, origin, origin, tolerance)
 
 
-def fit_affine(trajectories: Iterable[ArrayLike], about: ArrayLike | None = None,
-               tolerance: float = RANK_TOLERANCE) -> Regression:
+def fit_affine(
+    trajectories: Iterable[ArrayLike], about: ArrayLike | None = None, tolerance: float = RANK_TOLERANCE
+) -> Regression:
     """The fit with an offset: A on deviations from the fixed point or, where that is not given, from the mean.
 
     Args:
@@ -133,8 +134,9 @@ def steps_to_stay(values: ArrayLike, target: float, band: float = BAND) -> int |
     return steps if steps < len(inside) else None
 
 
-def measure(return_map: ReturnMap, phases: Sequence[float] = PHASES, steps: int = STEPS,
-            fixed_point: FixedPoint | None = None) -> Convergence:
+def measure(
+    return_map: ReturnMap, phases: Sequence[float] = PHASES, steps: int = STEPS, fixed_point: FixedPoint | None = None
+) -> Convergence:
     """Measure convergence by every means: derivative, regressions, and counting.
 
     The regressions take the trials that went through all their steps.

@@ -101,8 +101,10 @@ class ReturnMap:
         self.rig = accept(rig)
         sigma1, sigma2 = self.rig.front.step_length, self.rig.rear.step_length
         if abs(sigma1 - sigma2) > 1e-9 * sigma1:
-            raise ValueError(f'a return map needs wheels of equal step length 2 ℓ sin α, got {sigma1:.6g} m in front '
-                             f'and {sigma2:.6g} m in the rear: their feet never come back to the same distance')
+            raise ValueError(
+                f'a return map needs wheels of equal step length 2 ℓ sin α, got {sigma1:.6g} m in front '
+                f'and {sigma2:.6g} m in the rear: their feet never come back to the same distance'
+            )
         unit = math.sqrt(self.rig.gravity / self.rig.front.length)
         self._scale = np.array([unit, 1.0, unit])
 
@@ -166,7 +168,8 @@ class ReturnMap:
             here, there = self._newton(here, there) or (there.state, self.linearize(there.state))
         raise ValueError(
             f'no fixed point was found in {limit} iterations; the last state, {_text(here)}, still changes '
-            f'by {self._distance(here, there.state):.2g} in a step: start elsewhere, or the pair has no limit cycle')
+            f'by {self._distance(here, there.state):.2g} in a step: start elsewhere, or the pair has no limit cycle'
+        )
 
     def _newton(self, here: SectionState, there: Return) -> tuple[SectionState, Return] | None:
         """Newton's step and the map there, where that is progress."""

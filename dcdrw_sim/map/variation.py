@@ -56,12 +56,14 @@ def jacobian(rig: RigParams, state: State, S: Any) -> Floats:
 
     weight1 = rig.gravity / l1 * np.cos(theta1 + rig.slope)
     weight2 = rig.gravity / l2 * np.cos(theta2 + rig.slope)
-    rows = np.array([
-        [zero, one, zero, zero],
-        np.array([weight1, zero, zero, zero]) - (pull * by_p1 + p1 * by_pull) / (m1 * l1),
-        [zero, zero, zero, one],
-        np.array([zero, zero, weight2, zero]) + (pull * by_p2 + p2 * by_pull) / (m2 * l2),
-    ])
+    rows = np.array(
+        [
+            [zero, one, zero, zero],
+            np.array([weight1, zero, zero, zero]) - (pull * by_p1 + p1 * by_pull) / (m1 * l1),
+            [zero, zero, zero, one],
+            np.array([zero, zero, weight2, zero]) + (pull * by_p2 + p2 * by_pull) / (m2 * l2),
+        ]
+    )
     return np.moveaxis(rows, (0, 1), (-2, -1))
 
 
@@ -72,8 +74,9 @@ def propagators(rig: RigParams, segments: Sequence[Segment]) -> Floats:
     all points of a segment at once.
     """
     durations = np.array([segment.end - segment.start for segment in segments])
-    states = np.array([segment.at(segment.start + duration * _PARTS)
-                       for segment, duration in zip(segments, durations, strict=True)])
+    states = np.array(
+        [segment.at(segment.start + duration * _PARTS) for segment, duration in zip(segments, durations, strict=True)]
+    )
     S = np.array([[stance_distance(rig, *segment.steps)] for segment in segments])
     growth = durations[:, None, None, None] * jacobian(rig, State(*np.moveaxis(states, 1, 0)), S)
     size = 4 * STAGES
@@ -91,8 +94,10 @@ def jump(rig: RigParams, before: Segment, after: Segment) -> Floats:
     identity where no wheel strikes.
     """
     matrix = np.eye(4)
-    f_before, f_after = (rates(rig, segment.at(time), stance_distance(rig, *segment.steps))
-                         for segment, time in ((before, before.end), (after, after.start)))
+    f_before, f_after = (
+        rates(rig, segment.at(time), stance_distance(rig, *segment.steps))
+        for segment, time in ((before, before.end), (after, after.start))
+    )
     for i, wheel in enumerate((rig.front, rig.rear)):
         direction = after.steps[i] - before.steps[i]
         if direction:

@@ -39,8 +39,10 @@ def hub_distance(rig: RigParams, state: State, S: Any) -> Any:
     """D [m] at stance distance S (4), (5), (7)."""
     theta1, _, theta2, _ = state
     l1, l2, functions = rig.front.length, rig.rear.length, _functions(theta1)
-    return functions.hypot(l1 * functions.sin(theta1) - l2 * functions.sin(theta2) + S,
-                           l1 * functions.cos(theta1) - l2 * functions.cos(theta2))
+    return functions.hypot(
+        l1 * functions.sin(theta1) - l2 * functions.sin(theta2) + S,
+        l1 * functions.cos(theta1) - l2 * functions.cos(theta2),
+    )
 
 
 def coupler(rig: RigParams, state: State, S: Any) -> Coupler:

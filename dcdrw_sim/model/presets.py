@@ -19,7 +19,8 @@ PRESETS = {
     'paper': Preset("the paper's experiment: two wheels of 12 spokes on 2°, 5.25 N/m, 100 N·s/m", RigParams()),
     'paper-sweep': Preset(
         "the paper's sweep, without dimensions: m = ℓ = g = 1 on 1.75°, k̂ = 0.005, b̂ = 0.15",
-        RigParams(_UNIT_WHEEL, _UNIT_WHEEL, k=5e-3, b=0.15, slope=math.radians(1.75), gravity=1.0)),
+        RigParams(_UNIT_WHEEL, _UNIT_WHEEL, k=5e-3, b=0.15, slope=math.radians(1.75), gravity=1.0),
+    ),
 }
 
 

@@ -68,9 +68,16 @@ def dimensional(rig: RigParams, scales: Scales) -> RigParams:
 
 
 def _convert(rig: RigParams, scales: Scales, convert: Callable[[float, float], float]) -> RigParams:
-    front, rear = (wheel._replace(length=convert(wheel.length, scales.length), mass=convert(wheel.mass, scales.mass))
-                   for wheel in (rig.front, rig.rear))
+    front, rear = (
+        wheel._replace(length=convert(wheel.length, scales.length), mass=convert(wheel.mass, scales.mass))
+        for wheel in (rig.front, rig.rear)
+    )
     return rig._replace(
-        front=front, rear=rear, k=convert(rig.k, scales.stiffness), b=convert(rig.b, scales.damping),
-        D0=convert(rig.D0, scales.length), S0=convert(rig.S0, scales.length),
-        gravity=convert(rig.gravity, scales.gravity))
+        front=front,
+        rear=rear,
+        k=convert(rig.k, scales.stiffness),
+        b=convert(rig.b, scales.damping),
+        D0=convert(rig.D0, scales.length),
+        S0=convert(rig.S0, scales.length),
+        gravity=convert(rig.gravity, scales.gravity),
+    )

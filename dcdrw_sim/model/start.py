@@ -29,7 +29,12 @@ def start_state(rig: RigParams, initial_phase: float) -> State:
             raise ValueError(
                 f'slope {rig.slope:.6g} rad ({math.degrees(rig.slope):.4g}°) is too gentle for the {name} wheel to '
                 f'roll by itself; make it steeper than {least:.6g} rad ({math.degrees(least):.4g}°), or give the '
-                'angles and speeds of the start instead of a phase')
+                'angles and speeds of the start instead of a phase'
+            )
     theta1, theta2 = -rig.front.alpha, rig.rear.alpha * (1.0 - 2.0 * initial_phase)
-    return State(theta1, float(limit_cycle_speed(rig.front, rig.slope, rig.gravity)),
-                 theta2, float(limit_cycle_speed(rig.rear, rig.slope, rig.gravity, theta2)))
+    return State(
+        theta1,
+        float(limit_cycle_speed(rig.front, rig.slope, rig.gravity)),
+        theta2,
+        float(limit_cycle_speed(rig.rear, rig.slope, rig.gravity, theta2)),
+    )

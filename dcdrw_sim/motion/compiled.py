@@ -13,6 +13,7 @@ Function = TypeVar('Function', bound=Callable[..., Any])
 try:
     from numba import njit
     from numba.extending import register_jitable
+
     AVAILABLE = True
 except ImportError:
     AVAILABLE = False
@@ -36,9 +37,19 @@ def compiled(function: Function) -> Function:
 if AVAILABLE:
     from dcdrw_sim.motion import lanes as vectors
 
-    _FINGERPRINT = hashlib.sha256(b''.join(Path(module.__file__ or '').read_bytes() for module in (
-        strikes, taylor, vectors))).hexdigest()[:16]
+    _FINGERPRINT = hashlib.sha256(
+        b''.join(Path(module.__file__ or '').read_bytes() for module in (strikes, taylor, vectors))
+    ).hexdigest()[:16]
 
-    for _function in (taylor.sin_series, taylor.cos_series, taylor.step_size, taylor.evaluate, taylor.expand,
-                      taylor.motion, strikes.reset, strikes.crossing, strikes.first_strike):
+    for _function in (
+        taylor.sin_series,
+        taylor.cos_series,
+        taylor.step_size,
+        taylor.evaluate,
+        taylor.expand,
+        taylor.motion,
+        strikes.reset,
+        strikes.crossing,
+        strikes.first_strike,
+    ):
         register_jitable(**_OPTIONS)(_function)

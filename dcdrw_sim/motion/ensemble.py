@@ -52,9 +52,35 @@ TOO_FAST, NONE_YET, NO_PAIR = -2, -1, -1
 TIME_OVER, STRIKES, STANDING, FALLEN, STALLED, HUBS_MET = (int(end) for end in End)
 
 # Rows of the work array behind those of the series.
-(PAIR, AHEAD1, AHEAD2, SLOWEST1, SLOWEST2, STRIKE1, STRIKE2, MISS1, MISS2, REACH, STEP, WHEEL, DIRECTION, S0, STRIDE1,
- STRIDE2, SPEED1, SPEED2, UNIT, TIME, STEPS1, STEPS2, LAST1, LAST2, ROLLED1, ROLLED2, SIZE) = range(
-     taylor.END, taylor.END + 27 * LANES, LANES)
+(
+    PAIR,
+    AHEAD1,
+    AHEAD2,
+    SLOWEST1,
+    SLOWEST2,
+    STRIKE1,
+    STRIKE2,
+    MISS1,
+    MISS2,
+    REACH,
+    STEP,
+    WHEEL,
+    DIRECTION,
+    S0,
+    STRIDE1,
+    STRIDE2,
+    SPEED1,
+    SPEED2,
+    UNIT,
+    TIME,
+    STEPS1,
+    STEPS2,
+    LAST1,
+    LAST2,
+    ROLLED1,
+    ROLLED2,
+    SIZE,
+) = range(taylor.END, taylor.END + 27 * LANES, LANES)
 NEWTON_ITERATIONS = 2
 """From the error of the inverse cubic down to rounding, mostly."""
 CONVERGED = 1e-7
@@ -74,8 +100,15 @@ class Ensemble(NamedTuple):
     """Time at each pair's end [s], shape (N,)."""
 
 
-def run_ensemble(rig: RigParams, states: ArrayLike, seconds: float, capacity: int, tolerance: float = TOLERANCE,
-                 strict: bool = True, **columns: ArrayLike) -> Ensemble:
+def run_ensemble(
+    rig: RigParams,
+    states: ArrayLike,
+    seconds: float,
+    capacity: int,
+    tolerance: float = TOLERANCE,
+    strict: bool = True,
+    **columns: ArrayLike,
+) -> Ensemble:
     """Run many pairs of one rig, each with its own start and, where given, its own parameters.
 
     Args:
@@ -95,8 +128,9 @@ def run_ensemble(rig: RigParams, states: ArrayLike, seconds: float, capacity: in
     return run_pairs(spread(rig, len(np.atleast_1d(states)), columns), states, seconds, capacity, tolerance, strict)
 
 
-def run_pairs(rigs: Rigs, states: ArrayLike, seconds: float, capacity: int, tolerance: float = TOLERANCE,
-              strict: bool = True) -> Ensemble:
+def run_pairs(
+    rigs: Rigs, states: ArrayLike, seconds: float, capacity: int, tolerance: float = TOLERANCE, strict: bool = True
+) -> Ensemble:
     """Run many pairs, each of its own rig.
 
     Args:
@@ -116,20 +150,23 @@ def run_pairs(rigs: Rigs, states: ArrayLike, seconds: float, capacity: int, tole
     if starts.shape != (count, 4):
         raise ValueError(f'states must be of shape (N, 4), got {starts.shape}')
     if not (seconds >= 0.0 and capacity >= 1 and tolerance > 0.0):
-        raise ValueError('seconds must be ≥ 0, capacity ≥ 1 and tolerance > 0, '
-                         f'got {seconds}, {capacity} and {tolerance}')
+        raise ValueError(
+            f'seconds must be ≥ 0, capacity ≥ 1 and tolerance > 0, got {seconds}, {capacity} and {tolerance}'
+        )
     free = np.full(count, math.inf)
     limits = np.column_stack([rigs.front.alpha, free, rigs.rear.alpha, free]) * (1 + 1e-12)
     if not (np.isfinite(starts) & (np.abs(starts) <= limits)).all():
         raise ValueError('states must be finite, their angles within ±α of their wheels')
-    ensemble = Ensemble(np.zeros((count, capacity), STRIKE), np.zeros(count, np.int64), np.zeros(count, np.int64),
-                        np.zeros(count))
+    ensemble = Ensemble(
+        np.zeros((count, capacity), STRIKE), np.zeros(count, np.int64), np.zeros(count, np.int64), np.zeros(count)
+    )
     if count:
         with np.errstate(all='ignore'):
             _run(_aligned(SIZE), _parameters(rigs), starts, float(seconds), float(tolerance), *ensemble)
     if strict and (lost := np.flatnonzero(ensemble.ends == TOO_FAST)).size:
-        raise MotionError(f'the motion of pair {lost[0]} at t = {ensemble.durations[lost[0]]:.9g} s is too fast to '
-                          'follow')
+        raise MotionError(
+            f'the motion of pair {lost[0]} at t = {ensemble.durations[lost[0]]:.9g} s is too fast to follow'
+        )
     return ensemble
 
 
@@ -195,8 +232,11 @@ def _parameters(rigs: Rigs) -> Floats:
     """Parameter rows of each pair, shape (N, PARAMETERS), in the order of the work array."""
     rows: Any = {}
     work_parameters(rows, 0, rigs._replace(slope=0.0))
-    rows |= {taylor.S: rigs.S0, taylor.COS_SLOPE: each(math.cos, rigs.slope),
-             taylor.SIN_SLOPE: each(math.sin, rigs.slope)}
+    rows |= {
+        taylor.S: rigs.S0,
+        taylor.COS_SLOPE: each(math.cos, rigs.slope),
+        taylor.SIN_SLOPE: each(math.sin, rigs.slope),
+    }
     parameters = np.empty((len(rigs.k), taylor.PARAMETERS))
     for row, value in rows.items():
         parameters[:, _column(row)] = value
@@ -211,7 +251,7 @@ def _aligned(size: int) -> Floats:
     """Zeros on a cache line's boundary: a vector that straddles two lines costs twice."""
     raw = np.zeros(size + 8)
     offset = -raw.ctypes.data // raw.itemsize % 8
-    return raw[offset:offset + size]
+    return raw[offset : offset + size]
 
 
 @compiled
@@ -346,8 +386,17 @@ def _strike(w: Any, l: int, i: int, direction: int) -> int:
 
 
 @compiled
-def _run(work: Any, parameters: Any, starts: Any, seconds: float, tolerance: float, records: Any, counts: Any,
-         ends: Any, durations: Any) -> None:
+def _run(
+    work: Any,
+    parameters: Any,
+    starts: Any,
+    seconds: float,
+    tolerance: float,
+    records: Any,
+    counts: Any,
+    ends: Any,
+    durations: Any,
+) -> None:
     """Run every pair: each lane takes the next one when its own has ended, and never waits for another."""
     w, lanes = bare(work), rows(bare(work), LANES)
     total, capacity = records.shape

@@ -49,8 +49,10 @@ def _function(name: str) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         vectors = [_vector(context, builder, *pair) for pair in zip(arguments, signature.args, strict=True)]
         function = cgutils.get_or_insert_function(
-            builder.module, ir.FunctionType(_VECTOR, [_VECTOR] * len(vectors)), f'llvm.{name}.v{taylor.LANES}f64')
+            builder.module, ir.FunctionType(_VECTOR, [_VECTOR] * len(vectors)), f'llvm.{name}.v{taylor.LANES}f64'
+        )
         return builder.call(function, vectors)
+
     return generate
 
 
@@ -58,22 +60,27 @@ def _instruction(name: str) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         vectors = [_vector(context, builder, *pair) for pair in zip(arguments, signature.args, strict=True)]
         return getattr(builder, name)(*vectors, flags=_CONTRACT)
+
     return generate
 
 
 def _unary(function: Any, generate: Any) -> None:
     """Give a function of one row its code."""
+
     @intrinsic  # type: ignore[untyped-decorator]
     def apply(context: Any, x: Any) -> Any:
         return ROW(x), generate
+
     overload(function)(lambda x: (lambda x: apply(x)) if x == ROW else None)
 
 
 def _binary(function: Any, generate: Any) -> None:
     """Give a function of two rows, or of a row and a number, its code."""
+
     @intrinsic  # type: ignore[untyped-decorator]
     def apply(context: Any, x: Any, y: Any) -> Any:
         return ROW(x, y), generate
+
     overload(function)(lambda x, y: (lambda x, y: apply(x, y)) if ROW in (x, y) else None)
 
 
@@ -90,6 +97,7 @@ _binary(taylor.minimum, _function('minnum'))
 def _bare(context: Any, w: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return context.make_array(w)(context, builder, arguments[0]).data
+
     return WORK(w), generate
 
 
@@ -104,6 +112,7 @@ def _load(context: Any, data: Any, offset: Any) -> Any:
         if data == WORK:
             return builder.load(builder.gep(arguments[0], [arguments[1]]))
         return builder.load(_pointer(builder, *arguments), align=8)
+
     return (ROW if data == ROWS else types.float64)(data, types.intp), generate
 
 
@@ -117,6 +126,7 @@ def _store(context: Any, data: Any, offset: Any, value: Any) -> Any:
             vector = _vector(context, builder, arguments[2], value)
             builder.store(vector, _pointer(builder, *arguments[:2]), align=8)
         return context.get_dummy_value()
+
     return types.void(data, types.intp, value), generate
 
 
@@ -138,6 +148,7 @@ def _convolve(context: Any, rows: Any, products: Any, n: Any) -> Any:
         for total, (out, _, _) in zip(sums, jobs, strict=True):
             builder.store(builder.load(total), _pointer(builder, data, out), align=8)
         return context.get_dummy_value()
+
     return types.void(rows, products, types.intp), generate
 
 

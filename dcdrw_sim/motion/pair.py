@@ -66,8 +66,13 @@ class Segment(NamedTuple):
     def at(self, times: Any) -> State:
         """The state at a time or an array of times [s]."""
         t = np.asarray(times) - self.start
-        return State(*(polynomial.polyval(t, series) for theta in (self.theta1, self.theta2)
-                       for series in (theta, polynomial.polyder(theta))))
+        return State(
+            *(
+                polynomial.polyval(t, series)
+                for theta in (self.theta1, self.theta2)
+                for series in (theta, polynomial.polyder(theta))
+            )
+        )
 
 
 class Motion(NamedTuple):
@@ -103,12 +108,22 @@ def work_parameters(w: taylor.Work, l: int, rig: RigParams, external_force: floa
     """Write a rig's parameters into lane l of a work array."""
     front, rear = rig.front, rig.rear
     for row, value in (
-        (taylor.G1, rig.gravity / front.length), (taylor.G2, rig.gravity / rear.length),
-        (taylor.COS_SLOPE, math.cos(rig.slope)), (taylor.SIN_SLOPE, math.sin(rig.slope)),
-        (taylor.L1, front.length), (taylor.L2, rear.length),
-        (taylor.INV_ML1, 1.0 / (front.mass * front.length)), (taylor.INV_ML2, 1.0 / (rear.mass * rear.length)),
-        (taylor.K, rig.k), (taylor.B, rig.b), (taylor.D0, rig.D0), (taylor.FORCE, external_force),
-        (taylor.ALPHA1, front.alpha), (taylor.ALPHA2, rear.alpha), (taylor.FREE1, 1.0), (taylor.FREE2, 1.0),
+        (taylor.G1, rig.gravity / front.length),
+        (taylor.G2, rig.gravity / rear.length),
+        (taylor.COS_SLOPE, math.cos(rig.slope)),
+        (taylor.SIN_SLOPE, math.sin(rig.slope)),
+        (taylor.L1, front.length),
+        (taylor.L2, rear.length),
+        (taylor.INV_ML1, 1.0 / (front.mass * front.length)),
+        (taylor.INV_ML2, 1.0 / (rear.mass * rear.length)),
+        (taylor.K, rig.k),
+        (taylor.B, rig.b),
+        (taylor.D0, rig.D0),
+        (taylor.FORCE, external_force),
+        (taylor.ALPHA1, front.alpha),
+        (taylor.ALPHA2, rear.alpha),
+        (taylor.FREE1, 1.0),
+        (taylor.FREE2, 1.0),
     ):
         w[row + l] = value
 
@@ -208,8 +223,13 @@ class Simulation:
         Returns the whole segment, of which `advance_to` may have passed a part already.
         """
         ahead = self._look_ahead()
-        segment = Segment(self._series_start, ahead.end, _coefficients(self._work, taylor.THETA1),
-                          _coefficients(self._work, taylor.THETA2), (self.steps[0], self.steps[1]))
+        segment = Segment(
+            self._series_start,
+            ahead.end,
+            _coefficients(self._work, taylor.THETA1),
+            _coefficients(self._work, taylor.THETA2),
+            (self.steps[0], self.steps[1]),
+        )
         self.time = self._series_start = ahead.end
         self._ahead = None
         self._write_state(ahead.state)
@@ -237,9 +257,16 @@ class Simulation:
         state, rig = self.state, self._rig
         spring = coupler(rig, state, self.stance_distance)
         return Motion(
-            self.time, state.theta1 + 2.0 * rig.front.alpha * self.steps[0], state.omega1,
-            state.theta2 + 2.0 * rig.rear.alpha * self.steps[1], state.omega2, spring.length, spring.rate,
-            coupler_force(rig, spring.length, spring.rate) + self._force, tuple(strikes))
+            self.time,
+            state.theta1 + 2.0 * rig.front.alpha * self.steps[0],
+            state.omega1,
+            state.theta2 + 2.0 * rig.rear.alpha * self.steps[1],
+            state.omega2,
+            spring.length,
+            spring.rate,
+            coupler_force(rig, spring.length, spring.rate) + self._force,
+            tuple(strikes),
+        )
 
     def prepare(self, time: float) -> None:
         """Do now the costly part of the way to a time [s], for which `advance_to` is about to ask: the new series.
@@ -294,8 +321,10 @@ class Simulation:
 
     def _require_progress(self, progress: bool) -> None:
         if not progress:
-            raise MotionError(f'the motion at t = {self.time:.9g} s is too fast to follow: speeds, spokes or '
-                              f'external_force ({self._force:g} N) are beyond all measure')
+            raise MotionError(
+                f'the motion at t = {self.time:.9g} s is too fast to follow: speeds, spokes or '
+                f'external_force ({self._force:g} N) are beyond all measure'
+            )
 
     def _hubs_meet(self, h: float) -> float:
         """When within a step the hubs meet; h where they do not. Feet on one foothold (S = 0) let D pass zero."""
@@ -309,7 +338,8 @@ class Simulation:
         if not length > MIN_COUPLER_LENGTH * self._rig.front.length:
             raise HubsMetError(
                 f'{End.HUBS_MET.meaning} (D = {length:.3g} m at t = {self.time:.6g} s, S = {self.stance_distance:.6g} '
-                'm); start with the feet further apart (S0), or use a stiffer coupler (k, b)')
+                'm); start with the feet further apart (S0), or use a stiffer coupler (k, b)'
+            )
 
     def _strike(self, i: int, direction: int) -> None:
         w, wheel = self._work, self._wheels[i]
@@ -383,10 +413,12 @@ def accept(rig: RigParams) -> RigParams:
     mass = 1.0 / (1.0 / rig.front.mass + 1.0 / rig.rear.mass)
     for name, value, most in (('k', rig.k, mass * fastest**2), ('b', rig.b, mass * fastest)):
         if value > most:
-            raise ValueError(f'{name} must be ≤ {most:.3g} with these wheels, got {value:g}: a stiffer coupler is a '
-                             'rod, whose motion takes too many steps to follow')
+            raise ValueError(
+                f'{name} must be ≤ {most:.3g} with these wheels, got {value:g}: a stiffer coupler is a '
+                'rod, whose motion takes too many steps to follow'
+            )
     return rig
 
 
 def _coefficients(w: taylor.Work, series: int) -> NDArray[np.float64]:
-    return np.array(w[series:series + ORDER * LANES + 1:LANES])
+    return np.array(w[series : series + ORDER * LANES + 1 : LANES])

@@ -35,16 +35,47 @@ ORDER = 16
 
 _SERIES = (ORDER + 1) * LANES
 (THETA1, OMEGA1, SIN1, COS1, THETA2, OMEGA2, SIN2, COS2, OMEGA, SIN, COS, LEVER1, LEVER2, LENGTH, PULL) = range(
-    0, 15 * _SERIES, _SERIES)
-(SUM1, SUM2, SUM3, SUM4, SUM5, SUM6, G1, G2, COS_SLOPE, SIN_SLOPE, L1, L2, INV_ML1, INV_ML2,
- K, B, D0, FORCE, S, FREE1, FREE2, ALPHA1, ALPHA2, END) = range(15 * _SERIES, 15 * _SERIES + 24 * LANES, LANES)
+    0, 15 * _SERIES, _SERIES
+)
+(
+    SUM1,
+    SUM2,
+    SUM3,
+    SUM4,
+    SUM5,
+    SUM6,
+    G1,
+    G2,
+    COS_SLOPE,
+    SIN_SLOPE,
+    L1,
+    L2,
+    INV_ML1,
+    INV_ML2,
+    K,
+    B,
+    D0,
+    FORCE,
+    S,
+    FREE1,
+    FREE2,
+    ALPHA1,
+    ALPHA2,
+    END,
+) = range(15 * _SERIES, 15 * _SERIES + 24 * LANES, LANES)
 FIRST_PARAMETER, PARAMETERS = G1, (END - G1) // LANES
 """Where the parameters begin, and how many there are."""
 
 Product = tuple[int, int, int]
 """Where the coefficient goes, and the two factors."""
-_ROTATIONS = ((SUM1, COS1, OMEGA1), (SUM2, SIN1, OMEGA1), (SUM3, COS2, OMEGA2), (SUM4, SIN2, OMEGA2),
-              (SUM5, COS, OMEGA), (SUM6, SIN, OMEGA))
+_ROTATIONS = (
+    (SUM1, COS1, OMEGA1),
+    (SUM2, SIN1, OMEGA1),
+    (SUM3, COS2, OMEGA2),
+    (SUM4, SIN2, OMEGA2),
+    (SUM5, COS, OMEGA),
+    (SUM6, SIN, OMEGA),
+)
 _COUPLER = ((SUM1, LENGTH + LANES, LENGTH + LANES), (SUM2, LENGTH + LANES, PULL))  # without D's constant coefficient
 _TORQUES = ((SUM1, LEVER1, PULL), (SUM2, LEVER2, PULL))
 
@@ -80,7 +111,7 @@ class _Rows:
 def convolve(w: Any, products: tuple[Product, ...], n: int) -> None:
     """Store the n-th coefficient of each product of two series, Σ_{j=0}^{n} a_j b_{n−j}; zero for n = −1."""
     for out, a, b in products:
-        w[out] = sum(map(mul, w[a:a + n * LANES + 1:LANES], w[b:b + n * LANES + 1:LANES][::-1]), 0.0)
+        w[out] = sum(map(mul, w[a : a + n * LANES + 1 : LANES], w[b : b + n * LANES + 1 : LANES][::-1]), 0.0)
 
 
 def sqrt(x: Any) -> Any:

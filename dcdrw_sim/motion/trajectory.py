@@ -81,9 +81,16 @@ class Run(NamedTuple):
         state, (steps1, steps2) = State(*motion), steps
         spring = coupler(self.rig, state, stance_distance(self.rig, steps1, steps2))
         return Trajectory(
-            t, *state, state.theta1 + 2 * self.rig.front.alpha * steps1,
-            state.theta2 + 2 * self.rig.rear.alpha * steps2, steps1, steps2, spring.length, spring.rate,
-            coupler_force(self.rig, spring.length, spring.rate))
+            t,
+            *state,
+            state.theta1 + 2 * self.rig.front.alpha * steps1,
+            state.theta2 + 2 * self.rig.rear.alpha * steps2,
+            steps1,
+            steps2,
+            spring.length,
+            spring.rate,
+            coupler_force(self.rig, spring.length, spring.rate),
+        )
 
 
 def run(rig: RigParams, state: State, seconds: float = math.inf, strikes: float = math.inf) -> Run:

@@ -79,8 +79,7 @@ def even_gait_on(alpha: float, k: float, b: float, slope: float) -> EvenGait | N
     gentlest = gentlest_even_gait(alpha, k, b)
     if not slope > gentlest.slope:
         return None
-    period = brentq(lambda period: _slope(alpha, k, b, period) - slope, SHORTEST, gentlest.period,
-                    xtol=1e-12)
+    period = brentq(lambda period: _slope(alpha, k, b, period) - slope, SHORTEST, gentlest.period, xtol=1e-12)
     return even_gait(alpha, k, b, float(period))
 
 
@@ -93,8 +92,10 @@ def worst_damping(alpha: float, k: float) -> float:
 
 def even_stall_band(alpha: float, k: float, slope: float) -> tuple[float, float] | None:
     """The dampings b̂ between which no pair walks on a slope [rad]; None where there are none."""
+
     def lack(log_b: float) -> float:
         return _least(alpha, k, math.exp(log_b))[1] - slope
+
     worst = math.log(worst_damping(alpha, k))
     if not lack(worst) > 0.0:
         return None
@@ -104,8 +105,12 @@ def even_stall_band(alpha: float, k: float, slope: float) -> tuple[float, float]
 
 def _least(alpha: float, k: float, b: float) -> tuple[float, float]:
     """The period that takes the gentlest slope, and that slope."""
-    found = minimize_scalar(lambda period: _slope(alpha, k, b, period), bounds=(SHORTEST, LONGEST), method='bounded',
-                            options={'xatol': 1e-8})
+    found = minimize_scalar(
+        lambda period: _slope(alpha, k, b, period),
+        bounds=(SHORTEST, LONGEST),
+        method='bounded',
+        options={'xatol': 1e-8},
+    )
     return float(found.x), float(found.fun)
 
 
@@ -142,5 +147,6 @@ def _flow(alpha: float, k: float, b: float, time: float) -> Floats:
     difference_push = -2.0 * k * alpha * np.array([(step - 1.0) / kappa, impulse]).real
     same, other = 0.5 * (sum_flow + difference_flow), 0.5 * (sum_flow - difference_flow)
     half_push = 0.5 * difference_push
-    return np.block([[same, other, sum_push[:, None], half_push[:, None]],
-                     [other, same, sum_push[:, None], -half_push[:, None]]])
+    return np.block(
+        [[same, other, sum_push[:, None], half_push[:, None]], [other, same, sum_push[:, None], -half_push[:, None]]]
+    )

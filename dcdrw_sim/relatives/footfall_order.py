@@ -45,10 +45,16 @@ def steady_contacts(phase: float, strides: int = 1) -> list[Contact]:
     """
     if not 0.0 <= phase < 1.0:
         raise ValueError(f'phase must be in [0, 1), got {phase}')
-    return sorted((Contact(foot, start, start + 0.5)
-                   for pair, delay in ((_FRONT, 0.0), (_REAR, phase / 2.0))
-                   for step in range(-2, 2 * strides)
-                   for foot, start in ((pair[step % 2], delay + step / 2.0),) if start > -0.5), key=_fall)
+    return sorted(
+        (
+            Contact(foot, start, start + 0.5)
+            for pair, delay in ((_FRONT, 0.0), (_REAR, phase / 2.0))
+            for step in range(-2, 2 * strides)
+            for foot, start in ((pair[step % 2], delay + step / 2.0),)
+            if start > -0.5
+        ),
+        key=_fall,
+    )
 
 
 def contacts(strikes: Iterable[Strike], until: float) -> list[Contact]:
@@ -75,7 +81,7 @@ def order(falls: Sequence[Contact]) -> str:
     """
     firsts = [i for i, contact in enumerate(falls) if contact.foot == 1]
     for i in reversed(firsts):
-        stride = falls[i:i + 4]
+        stride = falls[i : i + 4]
         if sorted(contact.foot for contact in stride) == [1, 2, 3, 4]:
             length = 2.0 * (stride[0].end - stride[0].start)
             text = '1'

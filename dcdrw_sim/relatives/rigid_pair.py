@@ -96,8 +96,10 @@ class RigidPair:
         if not 0.0 <= phase < 1.0:
             raise ValueError(f'phase must be in [0, 1), got {phase}')
         if not math.isclose(front.step_length, rear.step_length, rel_tol=1e-9):
-            raise ValueError(f'a rigid pair needs wheels of equal step length, got {front.step_length:.6g} m in front '
-                             f'and {rear.step_length:.6g} m behind')
+            raise ValueError(
+                f'a rigid pair needs wheels of equal step length, got {front.step_length:.6g} m in front '
+                f'and {rear.step_length:.6g} m behind'
+            )
         self.rig, self.phase = rig, phase
         rear_angle = rear.alpha * (1.0 - 2.0 * phase)
         rise = front.length * math.cos(front.alpha) - rear.length * math.cos(rear_angle)
@@ -112,7 +114,8 @@ class RigidPair:
             self._possible(front.alpha - abs(front_angle))
             self.stances = [
                 self._stance(S_between, (-front.alpha, rear_angle), (front_angle, rear.alpha), (False, True)),
-                self._stance(S, (front_angle, -rear.alpha), (front.alpha, rear_angle), (True, False))]
+                self._stance(S, (front_angle, -rear.alpha), (front.alpha, rear_angle), (True, False)),
+            ]
 
     # Geometry
 
@@ -136,8 +139,10 @@ class RigidPair:
     def _possible(self, margin: float) -> float:
         """What must not be negative for the linkage to close and to turn."""
         if not margin >= 0.0:
-            raise ValueError(f'a bar of {self.rig.D0:.6g} m is too short: with it these wheels cannot roll at a phase '
-                             f'of {100.0 * self.phase:g} %; make D0 longer')
+            raise ValueError(
+                f'a bar of {self.rig.D0:.6g} m is too short: with it these wheels cannot roll at a phase '
+                f'of {100.0 * self.phase:g} %; make D0 longer'
+            )
         return margin
 
     def state(self, theta1: float, theta2: float, S: float, energy: float) -> State:
@@ -165,40 +170,66 @@ class RigidPair:
         """The strike of the front, the rear or both wheels, from a state of the linkage with its feet S apart."""
         front, rear = self.rig.front, self.rig.rear
         S_after = S + struck[0] * front.step_length - struck[1] * rear.step_length
-        allowed = self.state(-front.alpha if struck[0] else before.theta1,
-                             -rear.alpha if struck[1] else before.theta2, S_after, self.kinetic_energy(before))
+        allowed = self.state(
+            -front.alpha if struck[0] else before.theta1,
+            -rear.alpha if struck[1] else before.theta2,
+            S_after,
+            self.kinetic_energy(before),
+        )
         mass = np.array([front.mass, front.mass, rear.mass, rear.mass])
         velocity, direction = self._velocities(before), self._velocities(allowed)
         share = float(direction @ (mass * velocity) / (direction @ (mass * direction)))
         after = allowed._replace(omega1=share * allowed.omega1, omega2=share * allowed.omega2)
         bar = self._bar(after, S_after)
-        pushes = np.array([[math.sin(after.theta1), math.cos(after.theta1), 0.0, 0.0],
-                           [0.0, 0.0, math.sin(after.theta2), math.cos(after.theta2)],
-                           [-bar[0], -bar[1], bar[0], bar[1]]])
+        pushes = np.array(
+            [
+                [math.sin(after.theta1), math.cos(after.theta1), 0.0, 0.0],
+                [0.0, 0.0, math.sin(after.theta2), math.cos(after.theta2)],
+                [-bar[0], -bar[1], bar[0], bar[1]],
+            ]
+        )
         impulses = np.linalg.lstsq(pushes.T, mass * (share * direction - velocity), rcond=None)[0]
         return Impact(after, share**2, *impulses.tolist())
 
     def _velocities(self, state: State) -> NDArray[np.float64]:
         """Of the front and the rear hub, along the slope and along its normal [m/s]."""
         v1, v2 = self.rig.front.length * state.omega1, self.rig.rear.length * state.omega2
-        return np.array([v1 * math.cos(state.theta1), -v1 * math.sin(state.theta1),
-                         v2 * math.cos(state.theta2), -v2 * math.sin(state.theta2)])
+        return np.array(
+            [
+                v1 * math.cos(state.theta1),
+                -v1 * math.sin(state.theta1),
+                v2 * math.cos(state.theta2),
+                -v2 * math.sin(state.theta2),
+            ]
+        )
 
     def _bar(self, state: State, S: float) -> tuple[float, float]:
         """Its direction, from the rear hub to the front one."""
         l1, l2 = self.rig.front.length, self.rig.rear.length
-        return ((l1 * math.sin(state.theta1) - l2 * math.sin(state.theta2) + S) / self.rig.D0,
-                (l1 * math.cos(state.theta1) - l2 * math.cos(state.theta2)) / self.rig.D0)
+        return (
+            (l1 * math.sin(state.theta1) - l2 * math.sin(state.theta2) + S) / self.rig.D0,
+            (l1 * math.cos(state.theta1) - l2 * math.cos(state.theta2)) / self.rig.D0,
+        )
 
-    def _stance(self, S: float, start: tuple[float, float], end: tuple[float, float],
-                struck: tuple[bool, bool]) -> Stance:
+    def _stance(
+        self, S: float, start: tuple[float, float], end: tuple[float, float], struck: tuple[bool, bool]
+    ) -> Stance:
         def depth(theta1: float) -> float:
             return -self.potential_energy(theta1, self.rear_angle(theta1, S), S)
+
         top = minimize_scalar(depth, bounds=(start[0], end[0]), method='bounded', options={'xatol': 1e-9})
         kept = self.impact(self.state(*end, S, 1.0), S, struck).kept
         height = self.potential_energy(*start, S)
-        return Stance(S, start, end, struck, kept, height - self.potential_energy(*end, S),
-                      max(-float(top.fun) - height, 0.0), float(top.x))
+        return Stance(
+            S,
+            start,
+            end,
+            struck,
+            kept,
+            height - self.potential_energy(*end, S),
+            max(-float(top.fun) - height, 0.0),
+            float(top.x),
+        )
 
     # Gait
 
@@ -233,8 +264,10 @@ class RigidPair:
 
     def impacts(self) -> list[Impact]:
         """The strikes of the steady gait, in the order of `stances`."""
-        return [self.impact(self.state(*stance.end, stance.S, energy + stance.drop), stance.S, stance.struck)
-                for stance, energy in self._steady()]
+        return [
+            self.impact(self.state(*stance.end, stance.S, energy + stance.drop), stance.S, stance.struck)
+            for stance, energy in self._steady()
+        ]
 
     def _steady(self) -> Iterator[tuple[Stance, float]]:
         """The stances, with the kinetic energy at the start of each that returns after a step."""
@@ -254,6 +287,7 @@ class RigidPair:
             theta2 = self.rear_angle(theta1, stance.S)
             left = total - self.potential_energy(theta1, theta2, stance.S)
             return 1.0 / float(self.state(theta1, theta2, stance.S, left).omega1)
+
         return float(quad(pace, stance.start[0], stance.end[0], points=[stance.top], epsabs=0.0, epsrel=1e-10)[0])
 
 
@@ -264,8 +298,10 @@ def energy_per_metre(rig: RigParams) -> float:
 
 def gentlest_slope(rig: RigParams, phase: float) -> float:
     """The slope [rad] above which the rigid pair has a steady gait at this phase."""
+
     def margin(slope: float) -> float:
         return RigidPair(rig._replace(slope=slope), phase).margin
+
     if not margin(STEEPEST) > 0.0:
         return math.nan
     return float(brentq(margin, 0.0, STEEPEST, xtol=1e-12))
@@ -278,14 +314,18 @@ def fastest_phase(rig: RigParams) -> float:
         ValueError: the slope is too gentle for a gait at any phase, or as `RigidPair`.
 
     """
+
     def slowness(phase: float) -> float:
         return -_velocity(rig, phase)
+
     phases = np.linspace(NEAR_TOGETHER, 1.0 - NEAR_TOGETHER, PHASES)
     speeds = [_velocity(rig, phase) for phase in phases]
     best = int(np.argmax(speeds))
     if not speeds[best] > 0.0:
-        raise ValueError(f'slope {math.degrees(rig.slope):.4g}° is too gentle for the rigid pair; make it steeper than '
-                         f'{math.degrees(gentlest_slope(rig, 0.5)):.4g}°, which 50 % needs')
+        raise ValueError(
+            f'slope {math.degrees(rig.slope):.4g}° is too gentle for the rigid pair; make it steeper than '
+            f'{math.degrees(gentlest_slope(rig, 0.5)):.4g}°, which 50 % needs'
+        )
     around = (phases[max(best - 1, 0)], phases[min(best + 1, PHASES - 1)])
     return float(minimize_scalar(slowness, bounds=around, method='bounded', options={'xatol': 1e-7}).x)
 
@@ -297,8 +337,10 @@ def slope_for_velocity(rig: RigParams, phase: float, velocity: float) -> float:
         ValueError: no slope up to 45° gives that speed.
 
     """
+
     def excess(slope: float) -> float:
         return _velocity(rig._replace(slope=slope), phase) - velocity
+
     if not (velocity > 0.0 and excess(STEEPEST) > 0.0):
         raise ValueError(f'no slope up to 45° gives the rigid pair a speed of {velocity:g} m/s')
     return float(brentq(excess, 0.0, STEEPEST, xtol=1e-10))

@@ -60,8 +60,9 @@ def fate(wheel: WheelParams, slope: float, gravity: float, theta: float, omega: 
 
     """
     if not slope >= 0.0:
-        raise ValueError(f'slope must be ≥ 0, got {slope:g} rad: for an uphill one change the signs of slope, angle '
-                         'and speed')
+        raise ValueError(
+            f'slope must be ≥ 0, got {slope:g} rad: for an uphill one change the signs of slope, angle and speed'
+        )
     if not slope > gentlest_slope(wheel):
         return Fate.STANDS
     if slope >= wheel.alpha:  # nowhere to rest: the weight presses on the forward spoke only

@@ -18,22 +18,26 @@ class SimulatorParams(NamedTuple):
     """How the simulated rig starts, samples and errs."""
 
     rate: Annotated[float, Quantity('joint states per second', 'Hz', above=0.0, high=10_000.0, live=True)] = 1000.0
-    real_time_factor: Annotated[float, Quantity('simulated seconds per second; 0: as fast as possible', low=0.0,
-                                                high=1000.0, live=True)] = 1.0
+    real_time_factor: Annotated[
+        float, Quantity('simulated seconds per second; 0: as fast as possible', low=0.0, high=1000.0, live=True)
+    ] = 1.0
     publish_clock: Annotated[bool, Quantity('publish simulated time on /clock, and stamp by it')] = False
     paused: Annotated[bool, Quantity('start paused: the wheels are held until ~/pause lets them go')] = False
-    initial_phase_percent: Annotated[float, Quantity('phase at the start, front wheel just after a strike',
-                                                     '% of a step', low=0.0, high=99.999)] = 21.6
+    initial_phase_percent: Annotated[
+        float, Quantity('phase at the start, front wheel just after a strike', '% of a step', low=0.0, high=99.999)
+    ] = 21.6
     theta1: Annotated[float, Quantity('front stance angle at the start', 'rad', derived=FROM_PHASE)] = math.nan
     omega1: Annotated[float, Quantity('front speed at the start', 'rad/s', derived=FROM_PHASE)] = math.nan
     theta2: Annotated[float, Quantity('rear stance angle at the start', 'rad', derived=FROM_PHASE)] = math.nan
     omega2: Annotated[float, Quantity('rear speed at the start', 'rad/s', derived=FROM_PHASE)] = math.nan
-    noise_deg: Annotated[float, Quantity('noise of the encoders, one standard deviation', '°', low=0.0,
-                                         live=True)] = 0.0
+    noise_deg: Annotated[float, Quantity('noise of the encoders, one standard deviation', '°', low=0.0, live=True)] = (
+        0.0
+    )
     drop_percent: Annotated[float, Quantity('samples lost at random', '%', low=0.0, high=100.0, live=True)] = 0.0
     seed: Annotated[int, Quantity('of noise and losses', low=0)] = 0
-    command_timeout: Annotated[float, Quantity('a coupler_force_command older than this counts as 0', 's', above=0.0,
-                                               live=True)] = 0.2
+    command_timeout: Annotated[
+        float, Quantity('a coupler_force_command older than this counts as 0', 's', above=0.0, live=True)
+    ] = 0.2
 
     def check_pace(self) -> None:
         """Refuse a pace that leaves the clock behind.
@@ -43,8 +47,10 @@ class SimulatorParams(NamedTuple):
 
         """
         if self.real_time_factor != 1.0 and not self.publish_clock:
-            raise ValueError(f'real_time_factor {self.real_time_factor:g} needs publish_clock: true, and '
-                             'use_sim_time: true in the other nodes: their clock must keep the same pace')
+            raise ValueError(
+                f'real_time_factor {self.real_time_factor:g} needs publish_clock: true, and '
+                'use_sim_time: true in the other nodes: their clock must keep the same pace'
+            )
 
     def start(self, rig: RigParams) -> tuple[RigParams, State]:
         """The rig and its state at the start: as given, and from the initial phase where not.
@@ -116,10 +122,15 @@ class SimulatedRig:
         if held:
             rig = self.simulation.rig
             force = rig.k * (motion.length - rig.D0)
-            return JointSample(stamp_ns, Turn(rotation1, 0.0), Turn(rotation2, 0.0),
-                               CouplerSample(motion.length, 0.0, force))
-        return JointSample(stamp_ns, Turn(rotation1, motion.omega1), Turn(rotation2, motion.omega2),
-                           CouplerSample(motion.length, motion.rate, motion.force))
+            return JointSample(
+                stamp_ns, Turn(rotation1, 0.0), Turn(rotation2, 0.0), CouplerSample(motion.length, 0.0, force)
+            )
+        return JointSample(
+            stamp_ns,
+            Turn(rotation1, motion.omega1),
+            Turn(rotation2, motion.omega2),
+            CouplerSample(motion.length, motion.rate, motion.force),
+        )
 
 
 class Timeline:

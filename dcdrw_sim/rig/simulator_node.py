@@ -151,13 +151,17 @@ class SimulatorNode(Node):
         elif standing:
             level, message = Level.WARN, f'the {" and the ".join(standing)} wheel stands still on two spokes'
         behind = self._timeline.reached(self._now()) - self._timeline.due
-        return Diagnosis(level, message, {
-            'simulated time': f'{simulation.time:.3f} s',
-            'behind the pace': f'{max(behind, 0.0):.3f} s' if math.isfinite(behind) else 'as fast as possible',
-            'n': str(simulation.steps[0] - simulation.steps[1]),
-            'external force': f'{simulation.external_force:g} N',
-            'commands refused': str(self._refused_commands),
-        })
+        return Diagnosis(
+            level,
+            message,
+            {
+                'simulated time': f'{simulation.time:.3f} s',
+                'behind the pace': f'{max(behind, 0.0):.3f} s' if math.isfinite(behind) else 'as fast as possible',
+                'n': str(simulation.steps[0] - simulation.steps[1]),
+                'external force': f'{simulation.external_force:g} N',
+                'commands refused': str(self._refused_commands),
+            },
+        )
 
 
 def main(args: list[str] | None = None) -> int:

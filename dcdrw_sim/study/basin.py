@@ -85,4 +85,5 @@ def least_speeds(rig: RigParams, phases: ArrayLike, seconds: float) -> Floats:
     def walks(speeds: Floats) -> NDArray[np.bool_]:
         walking: NDArray[np.bool_] = judge_from(rig, across, speeds, seconds).verdict <= Verdict.ELSEWHERE
         return walking
+
     return bisect(walks, np.ones_like(across), np.zeros_like(across), HALVINGS)

@@ -149,8 +149,7 @@ class Search(NamedTuple):
 Report = Callable[[int], object]
 
 
-def score(task: Task, k: Floats, b: Floats, slope: Floats | None = None,
-          report: Report = lambda count: None) -> Scores:
+def score(task: Task, k: Floats, b: Floats, slope: Floats | None = None, report: Report = lambda count: None) -> Scores:
     """Judge couplers, on all cores.
 
     Args:
@@ -168,8 +167,13 @@ def score(task: Task, k: Floats, b: Floats, slope: Floats | None = None,
     return Scores(k, b, *_score(task, spread(task.rig, len(k), {'k': k, 'b': b, 'slope': slopes}), report))
 
 
-def search(task: Task, k: tuple[float, float], b: tuple[float, float], tolerance: float = TOLERANCE,
-           report: Report = lambda count: None) -> Search:
+def search(
+    task: Task,
+    k: tuple[float, float],
+    b: tuple[float, float],
+    tolerance: float = TOLERANCE,
+    report: Report = lambda count: None,
+) -> Search:
     """Find the best couplers within bounds: on a logarithmic grid, then on ever finer ones around the best so far.
 
     Args:
@@ -196,8 +200,9 @@ def search(task: Task, k: tuple[float, float], b: tuple[float, float], tolerance
         return forgiving_order(task, k, b, tolerance, report)
 
     start, near = grid.order()[0], _blunt_order(grid, eased)[0]
-    return Search(grid, _zoom(fastest, (grid.k[start], grid.b[start]), k, b),
-                  _zoom(forgiving, (grid.k[near], grid.b[near]), k, b))
+    return Search(
+        grid, _zoom(fastest, (grid.k[start], grid.b[start]), k, b), _zoom(forgiving, (grid.k[near], grid.b[near]), k, b)
+    )
 
 
 def mesh(k: tuple[float, float], b: tuple[float, float]) -> tuple[Floats, Floats]:
@@ -205,18 +210,27 @@ def mesh(k: tuple[float, float], b: tuple[float, float]) -> tuple[Floats, Floats
     return _mesh(np.geomspace(*k, GRID), np.geomspace(*b, GRID))
 
 
-def forgiving_order(task: Task, k: Floats, b: Floats, tolerance: float,
-                    report: Report = lambda count: None) -> NDArray[np.int64]:
+def forgiving_order(
+    task: Task, k: Floats, b: Floats, tolerance: float, report: Report = lambda count: None
+) -> NDArray[np.int64]:
     """The couplers' indices, best first, each as good as the worst that it may turn out to be.
 
     That is k and b each off by the tolerance either way, and the slope gentler by EASE.
     """
     factors = (1.0 - tolerance, 1.0, 1.0 + tolerance)
-    cases = [(k_factor, b_factor, slope) for k_factor in factors for b_factor in factors
-             for slope in (task.rig.slope, (1.0 - EASE) * task.rig.slope)]
+    cases = [
+        (k_factor, b_factor, slope)
+        for k_factor in factors
+        for b_factor in factors
+        for slope in (task.rig.slope, (1.0 - EASE) * task.rig.slope)
+    ]
     scores = score(
-        task, np.concatenate([case[0] * k for case in cases]), np.concatenate([case[1] * b for case in cases]),
-        np.repeat([case[2] for case in cases], len(k)), report)
+        task,
+        np.concatenate([case[0] * k for case in cases]),
+        np.concatenate([case[1] * b for case in cases]),
+        np.repeat([case[2] for case in cases], len(k)),
+        report,
+    )
     return _worst_of(scores, np.arange(len(scores.k)).reshape(CASES, -1))
 
 
@@ -230,10 +244,19 @@ def assess(task: Task, k: float, b: float, tolerance: float = TOLERANCE) -> Asse
     rig = task.rig._replace(k=k, b=b)
     found = judge_points(spread(rig, 1, {}), task.seconds, task.phases, task.band)
     return Assessment(
-        k, b, Verdict(int(found['verdict'][0])), tuple(found['start_steps'][0].tolist()), float(found['time'][0]),
-        found['section_theta2'][0], float(found['cycle_theta2'][0]), float(found['multipliers'][0, 0]),
-        float(found['speed'][0]), float(found['damper_loss'][0]), tuple(_sensitivity(task, rig, tolerance)),
-        {name: _margin(task, rig, name) for name in VARIED})
+        k,
+        b,
+        Verdict(int(found['verdict'][0])),
+        tuple(found['start_steps'][0].tolist()),
+        float(found['time'][0]),
+        found['section_theta2'][0],
+        float(found['cycle_theta2'][0]),
+        float(found['multipliers'][0, 0]),
+        float(found['speed'][0]),
+        float(found['damper_loss'][0]),
+        tuple(_sensitivity(task, rig, tolerance)),
+        {name: _margin(task, rig, name) for name in VARIED},
+    )
 
 
 def _sensitivity(task: Task, rig: RigParams, tolerance: float) -> Iterator[Variation]:
@@ -301,18 +324,30 @@ def _score_piece(task: Task, rigs: Rigs, room: int) -> tuple[NDArray[Any], ...]:
     pairs, ensemble = run_starts(rigs, task.seconds, task.phases, room)
     judgement, _ = judge(ensemble, pairs, 1, task.band)
     verdicts, steps, time = (
-        value.reshape(-1, len(task.phases)) for value in (judgement.verdict, judgement.steps, judgement.time))
-    return (verdicts.max(axis=1), (verdicts == Verdict.SETTLES).mean(axis=1), steps.max(axis=1), steps.mean(axis=1),
-            time.max(axis=1))
+        value.reshape(-1, len(task.phases)) for value in (judgement.verdict, judgement.steps, judgement.time)
+    )
+    return (
+        verdicts.max(axis=1),
+        (verdicts == Verdict.SETTLES).mean(axis=1),
+        steps.max(axis=1),
+        steps.mean(axis=1),
+        time.max(axis=1),
+    )
 
 
-def _zoom(order: Callable[[Floats, Floats], NDArray[np.int64]], best: tuple[float, float], k: tuple[float, float],
-          b: tuple[float, float]) -> tuple[float, float]:
+def _zoom(
+    order: Callable[[Floats, Floats], NDArray[np.int64]],
+    best: tuple[float, float],
+    k: tuple[float, float],
+    b: tuple[float, float],
+) -> tuple[float, float]:
     """The best coupler, on ever finer grids around the best so far."""
     reaches = [2.0 * math.log(high / low) / (GRID - 1) for low, high in (k, b)]
     for _ in range(ZOOMS):
-        axes = [np.clip(value * np.exp(np.linspace(-reach, reach, ZOOM)), *bounds)
-                for value, reach, bounds in zip(best, reaches, (k, b), strict=True)]
+        axes = [
+            np.clip(value * np.exp(np.linspace(-reach, reach, ZOOM)), *bounds)
+            for value, reach, bounds in zip(best, reaches, (k, b), strict=True)
+        ]
         ks, bs = _mesh(*axes)
         first = order(ks, bs)[0]
         best = float(ks[first]), float(bs[first])
@@ -325,8 +360,12 @@ def _blunt_order(*grids: Scores) -> NDArray[np.int64]:
     both = Scores(*map(np.concatenate, zip(*grids, strict=True)))
     places = np.arange(len(both.k)).reshape(len(grids), GRID, GRID)
     padded = np.pad(places, ((0, 0), (1, 1), (1, 1)), mode='edge')
-    return _worst_of(both, np.concatenate(
-        [padded[:, i:i + GRID, j:j + GRID].reshape(len(grids), -1) for i in range(3) for j in range(3)]))
+    return _worst_of(
+        both,
+        np.concatenate(
+            [padded[:, i : i + GRID, j : j + GRID].reshape(len(grids), -1) for i in range(3) for j in range(3)]
+        ),
+    )
 
 
 def _worst_of(scores: Scores, members: NDArray[np.int64]) -> NDArray[np.int64]:

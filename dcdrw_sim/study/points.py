@@ -25,8 +25,9 @@ ROCKING = 200
 """Room for the strikes of two wheels that rock until they stand: each about ln(1e-6)/ln(cos 30°) = 96."""
 
 
-def judge_points(rigs: Rigs, seconds: float, phases: tuple[float, ...] = PHASES, band: float = BAND,
-                 room: int | None = None) -> dict[str, NDArray[Any]]:
+def judge_points(
+    rigs: Rigs, seconds: float, phases: tuple[float, ...] = PHASES, band: float = BAND, room: int | None = None
+) -> dict[str, NDArray[Any]]:
     """Every variable that `dcdrw_sim.study.sweep_dataset.VARIABLES` describes, for N rigs.
 
     The result of a rig depends on no other.
@@ -55,10 +56,15 @@ def judge_points(rigs: Rigs, seconds: float, phases: tuple[float, ...] = PHASES,
     longest = int(lasts.max(initial=1))
     cycles = find_limit_cycles(rigs, _guesses(sections, lasts, walks, starts))
     return {
-        **_of_points(judgement, starts), **_of_cycles(rigs, cycles), **_regressions(sections, lasts, walks, starts),
+        **_of_points(judgement, starts),
+        **_of_cycles(rigs, cycles),
+        **_regressions(sections, lasts, walks, starts),
         **{f'start_{name}': value.reshape(count, starts) for name, value in judgement._asdict().items()},
-        **{f'section_{name}': value[:, :longest].reshape(count, starts, longest)
-           for name, value in sections._asdict().items()}}
+        **{
+            f'section_{name}': value[:, :longest].reshape(count, starts, longest)
+            for name, value in sections._asdict().items()
+        },
+    }
 
 
 def run_starts(rigs: Rigs, seconds: float, phases: tuple[float, ...], room: int) -> tuple[Rigs, Ensemble]:
@@ -82,14 +88,16 @@ def section_room(rigs: Rigs, seconds: float) -> int:
 def wheels_of(rigs: Rigs) -> Iterator[Wheels]:
     """The wheels of every rig, with its slope and gravity."""
     for front, rear, slope, gravity in zip(
-            zip(*rigs.front, strict=True), zip(*rigs.rear, strict=True), rigs.slope, rigs.gravity, strict=True):
+        zip(*rigs.front, strict=True), zip(*rigs.rear, strict=True), rigs.slope, rigs.gravity, strict=True
+    ):
         yield WheelParams(*map(float, front)), WheelParams(*map(float, rear)), float(slope), float(gravity)
 
 
 def _fastest(front: WheelParams, rear: WheelParams, slope: float, gravity: float) -> float:
     """Steps per second of the faster wheel, were it always at its fastest."""
-    rates = [float(limit_cycle_speed(wheel, slope, gravity, wheel.alpha)) / (2.0 * wheel.alpha)
-             for wheel in (front, rear)]
+    rates = [
+        float(limit_cycle_speed(wheel, slope, gravity, wheel.alpha)) / (2.0 * wheel.alpha) for wheel in (front, rear)
+    ]
     if any(map(math.isnan, rates)):
         start_state(RigParams(front, rear, slope=slope, gravity=gravity), 0.0)  # says why
     return max(rates)
@@ -113,18 +121,25 @@ def starts(rig: RigParams, phases: ArrayLike, speeds: ArrayLike = 1.0) -> Floats
 
 
 @lru_cache(maxsize=1024)
-def _start_states(front: WheelParams, rear: WheelParams, slope: float, gravity: float,
-                  phases: tuple[float, ...]) -> Floats:
+def _start_states(
+    front: WheelParams, rear: WheelParams, slope: float, gravity: float, phases: tuple[float, ...]
+) -> Floats:
     """As `starts`, shape (starts, 4)."""
     return starts(RigParams(front, rear, slope=slope, gravity=gravity), phases)
 
 
 def _of_points(judgement: Judgement, starts: int) -> dict[str, NDArray[Any]]:
     """What the starts of each point have in common."""
-    verdicts, enters, steps, time = (value.reshape(-1, starts) for value in (
-        judgement.verdict, judgement.enters, judgement.steps, judgement.time))
-    return {'verdict': verdicts.max(axis=1), 'settles': (verdicts == Verdict.SETTLES).mean(axis=1),
-            'enters': enters.mean(axis=1), 'steps': steps.max(axis=1), 'time': time.max(axis=1)}
+    verdicts, enters, steps, time = (
+        value.reshape(-1, starts) for value in (judgement.verdict, judgement.enters, judgement.steps, judgement.time)
+    )
+    return {
+        'verdict': verdicts.max(axis=1),
+        'settles': (verdicts == Verdict.SETTLES).mean(axis=1),
+        'enters': enters.mean(axis=1),
+        'steps': steps.max(axis=1),
+        'time': time.max(axis=1),
+    }
 
 
 def _of_cycles(rigs: Rigs, cycles: LimitCycles) -> dict[str, NDArray[Any]]:
@@ -132,13 +147,21 @@ def _of_cycles(rigs: Rigs, cycles: LimitCycles) -> dict[str, NDArray[Any]]:
     walking = losses(rigs, cycles)
     omega1, theta2, omega2 = cycles.states.T
     return {
-        'cycle_omega1': omega1, 'cycle_theta2': theta2, 'cycle_omega2': omega2, 'cycle_period': cycles.periods,
-        'stable': cycles.stable, 'speed': walking.speed, 'strike_loss': walking.strikes, 'damper_loss': walking.damper,
-        **_polar('multiplier', cycles.multipliers)}
+        'cycle_omega1': omega1,
+        'cycle_theta2': theta2,
+        'cycle_omega2': omega2,
+        'cycle_period': cycles.periods,
+        'stable': cycles.stable,
+        'speed': walking.speed,
+        'strike_loss': walking.strikes,
+        'damper_loss': walking.damper,
+        **_polar('multiplier', cycles.multipliers),
+    }
 
 
-def _regressions(sections: Sections, lasts: NDArray[np.int64], walks: NDArray[np.bool_],
-                 starts: int) -> dict[str, NDArray[Any]]:
+def _regressions(
+    sections: Sections, lasts: NDArray[np.int64], walks: NDArray[np.bool_], starts: int
+) -> dict[str, NDArray[Any]]:
     """Both regressions, of the motions that walk."""
     count = len(walks) // starts
     states = np.stack([sections.omega1, sections.theta2, sections.omega2, sections.coupler_length], axis=-1)
@@ -148,7 +171,7 @@ def _regressions(sections: Sections, lasts: NDArray[np.int64], walks: NDArray[np
         for point in range(count):
             which = [pair for pair in range(point * starts, (point + 1) * starts) if walks[pair]]
             if which:
-                found = fit(states[pair, :lasts[pair], :size] for pair in which)
+                found = fit(states[pair, : lasts[pair], :size] for pair in which)
                 matrices[point], ranks[point] = found.matrix, found.rank
         values = np.full((count, size), complex(math.nan, math.nan))
         values[ranks > 0] = spectrum(matrices[ranks > 0])

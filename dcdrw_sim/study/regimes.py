@@ -171,8 +171,9 @@ def bisect(holds: Callable[[Floats], Bools], inside: ArrayLike, outside: ArrayLi
     return np.where(known, inner, math.nan)
 
 
-def stall_edges(rigs: Rigs, name: str, inside: ArrayLike, outside: ArrayLike, states: Floats, seconds: float,
-                halvings: int = 20) -> Floats:
+def stall_edges(
+    rigs: Rigs, name: str, inside: ArrayLike, outside: ArrayLike, states: Floats, seconds: float, halvings: int = 20
+) -> Floats:
     """The value of a parameter up to which all of a pair's starts walk on, of N pairs; NaN where there is no edge.
 
     Args:
@@ -191,6 +192,7 @@ def stall_edges(rigs: Rigs, name: str, inside: ArrayLike, outside: ArrayLike, st
         pairs = take(rigs._replace(**{name: values}), np.repeat(np.arange(count), each))
         found = judge_starts(pairs, states.reshape(-1, 4), seconds).verdict
         return np.asarray((found <= Verdict.ELSEWHERE).reshape(count, each).all(axis=1))
+
     return bisect(walk, inside, outside, halvings)
 
 
@@ -216,9 +218,11 @@ def _gaits(rigs: Rigs, name: str, periods: Floats, unknowns: Floats) -> Gaits:
     tangents = scales * inverses[:, :, 3]
     derivatives = jacobians[:, :3, :3] / scales[:, None, :3] + np.eye(3)
     found = size <= EXACT
-    return _where(found, Gaits(unknowns[:, 3], periods, unknowns[:, :3], tangents, derivatives),
-                  Gaits(*(np.full_like(part, math.nan) for part in (periods, periods, tangents[:, :3], tangents,
-                                                                    derivatives))))
+    return _where(
+        found,
+        Gaits(unknowns[:, 3], periods, unknowns[:, :3], tangents, derivatives),
+        Gaits(*(np.full_like(part, math.nan) for part in (periods, periods, tangents[:, :3], tangents, derivatives))),
+    )
 
 
 def _linearize(rigs: Rigs, name: str, periods: Floats, unknowns: Floats, scales: Floats) -> tuple[Floats, Floats]:

@@ -138,8 +138,10 @@ def targets(name: str) -> tuple[tuple[str, ...], float]:
     known['slope_deg'] = (('slope',), math.radians(1.0))
     if name not in known:
         near = get_close_matches(name, known, n=1)
-        raise ValueError(f'{name!r} is no parameter of a rig; '
-                         + (f'did you mean {near[0]}?' if near else f'there are {", ".join(known)}'))
+        raise ValueError(
+            f'{name!r} is no parameter of a rig; '
+            + (f'did you mean {near[0]}?' if near else f'there are {", ".join(known)}')
+        )
     return known[name]
 
 
@@ -169,19 +171,26 @@ def check_sweep(sweep: Sweep) -> None:
 @lru_cache(maxsize=8)
 def room(sweep: Sweep) -> int:
     """`section_room` of all points, row by row; what concerns the coupler alone is passed over."""
-    x, y = (axis if set(targets(axis.name)[0]) - _OF_COUPLER else axis._replace(values=axis.values[:1])
-            for axis in (sweep.x, sweep.y))
+    x, y = (
+        axis if set(targets(axis.name)[0]) - _OF_COUPLER else axis._replace(values=axis.values[:1])
+        for axis in (sweep.x, sweep.y)
+    )
     some = sweep._replace(x=x, y=y)
-    return max(section_room(rigs_of(some, (slice(i, i + 1), slice(0, len(y.values)))), sweep.seconds)
-               for i in range(len(x.values)))
+    return max(
+        section_room(rigs_of(some, (slice(i, i + 1), slice(0, len(y.values)))), sweep.seconds)
+        for i in range(len(x.values))
+    )
 
 
 def blocks(sweep: Sweep, size: int) -> list[Block]:
     """All points in blocks of at most `size`: whole rows, or parts of one."""
     along_x, along_y = sweep.shape
     rows, width = max(1, size // along_y), min(size, along_y)
-    return [(slice(i, min(i + rows, along_x)), slice(j, min(j + width, along_y)))
-            for i in range(0, along_x, rows) for j in range(0, along_y, width)]
+    return [
+        (slice(i, min(i + rows, along_x)), slice(j, min(j + width, along_y)))
+        for i in range(0, along_x, rows)
+        for j in range(0, along_y, width)
+    ]
 
 
 def block_size(sweep: Sweep) -> int:
@@ -200,15 +209,22 @@ def compute(sweep: Sweep, block: Block) -> dict[str, NDArray[Any]]:
     """All variables (`dcdrw_sim.study.sweep_dataset`) of the points of a block, each of shape (X, Y, ...)."""
     shape = tuple(part.stop - part.start for part in block)
     variables = judge_points(rigs_of(sweep, block), sweep.seconds, sweep.phases, sweep.band, room(sweep))
-    return {name: value.reshape(*shape, *value.shape[1:]) for name, value in variables.items()
-            if sweep.trajectories or not name.startswith('section_')}
+    return {
+        name: value.reshape(*shape, *value.shape[1:])
+        for name, value in variables.items()
+        if sweep.trajectories or not name.startswith('section_')
+    }
 
 
 def _columns(sweep: Sweep, block: Block) -> dict[str, Floats]:
     """The parameters that differ, at every point of a block, shape (N,)."""
     x, y = np.meshgrid(sweep.x.values[block[0]], sweep.y.values[block[1]], indexing='ij')
-    return {name: factor * grid.ravel() for axis, grid in ((sweep.x, x), (sweep.y, y))
-            for names, factor in (targets(axis.name),) for name in names}
+    return {
+        name: factor * grid.ravel()
+        for axis, grid in ((sweep.x, x), (sweep.y, y))
+        for names, factor in (targets(axis.name),)
+        for name in names
+    }
 
 
 def _ends(axis: Axis) -> Axis:

@@ -33,7 +33,7 @@ class Variable(NamedTuple):
 VARIABLES = (
     Variable('verdict', _POINT, '', 'the worst of the starts', np.int8),
     Variable('settles', _POINT, '', 'part of the starts that settle: |θ2| within the band at the last strikes'),
-    Variable('enters', _POINT, '', 'part of the starts that are within the band at some strike: the paper\'s way'),
+    Variable('enters', _POINT, '', "part of the starts that are within the band at some strike: the paper's way"),
     Variable('steps', _POINT, '', 'steps until |θ2| stays within the band, from the worst start; NaN: some never'),
     Variable('time', _POINT, 's', 'the same as time'),
     Variable('cycle_omega1', _POINT, 'rad/s', 'limit cycle at the section: speed of the front wheel'),
@@ -46,12 +46,20 @@ VARIABLES = (
     Variable('damper_loss', _POINT, 'J/m', 'energy lost in the damper per metre, on the limit cycle'),
     Variable('multipliers', (*_POINT, 'multiplier'), '', 'moduli of the multipliers of the return map, largest first'),
     Variable('multiplier_angles', (*_POINT, 'multiplier'), 'rad', 'their angles in the complex plane'),
-    Variable('raw_eigenvalues', (*_POINT, 'raw_eigenvalue'), '',
-             'moduli of the eigenvalues of the paper\'s regression on [θ1′, θ2, θ2′, D]; the first is 1 (erratum 5)'),
+    Variable(
+        'raw_eigenvalues',
+        (*_POINT, 'raw_eigenvalue'),
+        '',
+        "moduli of the eigenvalues of the paper's regression on [θ1′, θ2, θ2′, D]; the first is 1 (erratum 5)",
+    ),
     Variable('raw_eigenvalue_angles', (*_POINT, 'raw_eigenvalue'), 'rad', 'their angles in the complex plane'),
     Variable('raw_rank', _POINT, '', 'directions that the data of that regression hold; 0: no start walks', np.int8),
-    Variable('affine_eigenvalues', (*_POINT, 'affine_eigenvalue'), '',
-             'moduli of the eigenvalues of the regression with an offset on [θ1′, θ2, θ2′]'),
+    Variable(
+        'affine_eigenvalues',
+        (*_POINT, 'affine_eigenvalue'),
+        '',
+        'moduli of the eigenvalues of the regression with an offset on [θ1′, θ2, θ2′]',
+    ),
     Variable('affine_eigenvalue_angles', (*_POINT, 'affine_eigenvalue'), 'rad', 'their angles in the complex plane'),
     Variable('affine_rank', _POINT, '', 'directions that the data of that regression hold; 0: no start walks', np.int8),
     Variable('start_verdict', _START, '', 'what became of the motion', np.int8),
@@ -102,19 +110,33 @@ def to_dataset(sweep: Sweep, arrays: Arrays) -> Any:
     """
     require_extra('xarray')
     import xarray
+
     names = {'x': sweep.x.name, 'y': sweep.y.name}
     varied = {name for axis in (sweep.x, sweep.y) for name in targets(axis.name)[0]}
-    content = {v.name: (tuple(names.get(dim, dim) for dim in v.dims), arrays[v.name], _attributes(v))
-               for v in variables(sweep)}
-    coordinates = {axis.name: (axis.name, np.array(axis.values), _axis_attributes(axis.name))
-                   for axis in (sweep.x, sweep.y)}
-    coordinates['start'] = ('start', np.array(sweep.phases), {
-        'units': '1', 'long_name': 'phase at the start in steps, both wheels on their uncoupled limit cycles'})
-    return xarray.Dataset(content, coordinates, {
-        'title': 'sweep of the dynamically coupled double rimless wheel', 'sweep': sweep.to_json(),
-        'units': 'SI; for m = ℓ = g = 1 the nondimensional form: time in √(ℓ/g), mass in m, length in ℓ',
-        'section': 'the instant before a strike of the front wheel', 'seconds': sweep.seconds, 'band': sweep.band,
-        **{name: value for name, value in flatten(sweep.rig).items() if name not in varied}})
+    content = {
+        v.name: (tuple(names.get(dim, dim) for dim in v.dims), arrays[v.name], _attributes(v)) for v in variables(sweep)
+    }
+    coordinates = {
+        axis.name: (axis.name, np.array(axis.values), _axis_attributes(axis.name)) for axis in (sweep.x, sweep.y)
+    }
+    coordinates['start'] = (
+        'start',
+        np.array(sweep.phases),
+        {'units': '1', 'long_name': 'phase at the start in steps, both wheels on their uncoupled limit cycles'},
+    )
+    return xarray.Dataset(
+        content,
+        coordinates,
+        {
+            'title': 'sweep of the dynamically coupled double rimless wheel',
+            'sweep': sweep.to_json(),
+            'units': 'SI; for m = ℓ = g = 1 the nondimensional form: time in √(ℓ/g), mass in m, length in ℓ',
+            'section': 'the instant before a strike of the front wheel',
+            'seconds': sweep.seconds,
+            'band': sweep.band,
+            **{name: value for name, value in flatten(sweep.rig).items() if name not in varied},
+        },
+    )
 
 
 def sweep_of(dataset: Any) -> Sweep:
@@ -132,6 +154,7 @@ def open_sweep(path: Path) -> Any:
     """
     require_extra('xarray', 'netCDF4')
     import xarray
+
     dataset = xarray.open_dataset(path, engine='netcdf4')
     if 'sweep' not in dataset.attrs:
         dataset.close()
@@ -152,8 +175,16 @@ def write(path: Path, sweep: Sweep, parts: Iterable[tuple[Block, Arrays]], steps
     require_extra('xarray', 'netCDF4', 'dask.array')
     import dask.array
     import netCDF4
-    sizes = {'x': sweep.shape[0], 'y': sweep.shape[1], 'start': len(sweep.phases), 'step': steps, 'multiplier': 3,
-             'raw_eigenvalue': 4, 'affine_eigenvalue': 3}
+
+    sizes = {
+        'x': sweep.shape[0],
+        'y': sweep.shape[1],
+        'start': len(sweep.phases),
+        'step': steps,
+        'multiplier': 3,
+        'raw_eigenvalue': 4,
+        'affine_eigenvalue': 3,
+    }
     # Dask's arrays are not computed: xarray lays out the file, and the blocks fill it.
     empty = {v.name: dask.array.zeros([sizes[dim] for dim in v.dims], dtype=v.dtype) for v in variables(sweep)}
     to_dataset(sweep, empty).to_netcdf(path, engine='netcdf4', compute=False)
@@ -171,9 +202,11 @@ def write(path: Path, sweep: Sweep, parts: Iterable[tuple[Block, Arrays]], steps
 def _attributes(variable: Variable) -> dict[str, Any]:
     attributes: dict[str, Any] = {'units': variable.unit or '1', 'long_name': variable.doc}
     if variable.name.endswith('verdict'):
-        attributes |= {'flag_values': np.array([*Verdict], np.int8),
-                       'flag_meanings': ' '.join(verdict.name.lower() for verdict in Verdict),
-                       **{verdict.name.lower(): verdict.meaning for verdict in Verdict}}
+        attributes |= {
+            'flag_values': np.array([*Verdict], np.int8),
+            'flag_meanings': ' '.join(verdict.name.lower() for verdict in Verdict),
+            **{verdict.name.lower(): verdict.meaning for verdict in Verdict},
+        }
     return attributes
 
 

@@ -41,8 +41,13 @@ def is_complete(path: Path, sweep: Sweep) -> bool:
     return True
 
 
-def run_sweep(sweep: Sweep, path: Path, executor: Executor, at_once: int,
-              report: Callable[[Progress], None] = lambda progress: None) -> None:
+def run_sweep(
+    sweep: Sweep,
+    path: Path,
+    executor: Executor,
+    at_once: int,
+    report: Callable[[Progress], None] = lambda progress: None,
+) -> None:
     """Compute a sweep into a netCDF file; one that was interrupted goes on where it was.
 
     Blocks that are done lie in the folder PATH.parts until the file is written; each is written whole or not at all,
@@ -94,8 +99,12 @@ class _Parts:
                 raise OSError(f'another process is at work in {folder}') from None
             specification = folder / _SPECIFICATION
             if not specification.exists():
-                _write_whole(specification, lambda file: file.write(json.dumps(
-                    {'sweep': sweep.to_json(), 'block_size': block_size(sweep)}).encode()))
+                _write_whole(
+                    specification,
+                    lambda file: file.write(
+                        json.dumps({'sweep': sweep.to_json(), 'block_size': block_size(sweep)}).encode()
+                    ),
+                )
             content = json.loads(specification.read_bytes())
             _require_same(folder, Sweep.from_json(content['sweep']), sweep)
             yield cls(folder, sweep, content['block_size'])

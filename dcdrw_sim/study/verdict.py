@@ -116,20 +116,43 @@ def judge(ensemble: Ensemble, rigs: Rigs, capacity: int, band: float = BAND) -> 
     total = len(ensemble.counts)
     sections = Sections(*(np.full((total, capacity), math.nan) for _ in Sections._fields))
     judgement = Judgement(
-        np.zeros(total, np.int8), np.zeros(total, np.bool_), *(np.full(total, math.nan) for _ in range(5)),
-        *(np.zeros(total, np.int64) for _ in range(3)))
+        np.zeros(total, np.int8),
+        np.zeros(total, np.bool_),
+        *(np.full(total, math.nan) for _ in range(5)),
+        *(np.zeros(total, np.int64) for _ in range(3)),
+    )
     front, rear = rigs.front, rigs.rear
     wheels = np.column_stack([front.length, front.alpha, rear.length, rear.alpha, rigs.S0])
-    _judge(ensemble.strikes, ensemble.counts, ensemble.ends, ensemble.durations, wheels, float(band), *judgement,
-           *sections)
+    _judge(
+        ensemble.strikes, ensemble.counts, ensemble.ends, ensemble.durations, wheels, float(band), *judgement, *sections
+    )
     return judgement, sections
 
 
 @compiled
-def _judge(strikes: Any, strike_counts: Any, ends: Any, durations: Any, wheels: Any, band: float,
-           verdict: Any, enters: Any, steps_to_enter: Any, time_to_enter: Any, steps: Any, time: Any, last_theta2: Any,
-           counts: Any, step_difference: Any, slips: Any, times: Any, omega1s: Any, theta2s: Any, omega2s: Any,
-           lengths: Any) -> None:
+def _judge(
+    strikes: Any,
+    strike_counts: Any,
+    ends: Any,
+    durations: Any,
+    wheels: Any,
+    band: float,
+    verdict: Any,
+    enters: Any,
+    steps_to_enter: Any,
+    time_to_enter: Any,
+    steps: Any,
+    time: Any,
+    last_theta2: Any,
+    counts: Any,
+    step_difference: Any,
+    slips: Any,
+    times: Any,
+    omega1s: Any,
+    theta2s: Any,
+    omega2s: Any,
+    lengths: Any,
+) -> None:
     capacity = times.shape[1]
     for i in range(len(ends)):
         l1, alpha1, l2, alpha2, S = wheels[i]

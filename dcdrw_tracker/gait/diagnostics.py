@@ -20,36 +20,45 @@ def diagnose_sync(status: SyncStatus, age: float, stale_after: float) -> Diagnos
     level, message = _judge_sync(status, age, stale_after)
     low, high = status.swing_percent
     steps = status.steps_to_synchronization
-    return Diagnosis(level, message, {
-        'phase': phase_text(status.phase),
-        'error': f'{_number(status.error_percent, "+.1f", " %")} ({_number(math.degrees(status.error), "+.2f", "°")})',
-        'error within the last step': f'{_number(low, "+.1f")} to {_number(high, "+.1f", " %")}',
-        'n': str(status.step_difference),
-        'steps': str(status.steps),
-        'synchronized': str(status.synchronized).lower(),
-        'steps to synchronization': 'unknown' if steps is None else str(steps),
-        'initial phase': phase_text(status.initial_phase),
-        'per-step convergence ratio': _number(status.contraction, '.3f'),
-        'slipped steps': str(status.slips),
-        'times synchronization was lost': str(status.losses),
-        'restarts of the source': str(status.restarts),
-        **_stream(status.cadence, age),
-    })
+    return Diagnosis(
+        level,
+        message,
+        {
+            'phase': phase_text(status.phase),
+            'error': f'{_number(status.error_percent, "+.1f", " %")} '
+            f'({_number(math.degrees(status.error), "+.2f", "°")})',
+            'error within the last step': f'{_number(low, "+.1f")} to {_number(high, "+.1f", " %")}',
+            'n': str(status.step_difference),
+            'steps': str(status.steps),
+            'synchronized': str(status.synchronized).lower(),
+            'steps to synchronization': 'unknown' if steps is None else str(steps),
+            'initial phase': phase_text(status.initial_phase),
+            'per-step convergence ratio': _number(status.contraction, '.3f'),
+            'slipped steps': str(status.slips),
+            'times synchronization was lost': str(status.losses),
+            'restarts of the source': str(status.restarts),
+            **_stream(status.cadence, age),
+        },
+    )
 
 
 def diagnose_phase(status: PhaseStatus, age: float, stale_after: float) -> Diagnosis:
     """The estimator's diagnosis; arguments as `diagnose_sync`, with the age of the last sample that was accepted."""
     level, message = _judge_phase(status, age, stale_after)
-    return Diagnosis(level, message, {
-        'steps of the front wheel': str(status.front_steps),
-        'steps of the rear wheel': str(status.rear_steps),
-        'n': str(status.front_steps - status.rear_steps),
-        'n is certain': str(not status.n_uncertain).lower(),
-        'samples accepted': str(status.accepted),
-        **{f'samples refused: {why}': str(count) for why, count in status.refused.items()},
-        'restarts of the source': str(status.restarts),
-        **_stream(status.cadence, age),
-    })
+    return Diagnosis(
+        level,
+        message,
+        {
+            'steps of the front wheel': str(status.front_steps),
+            'steps of the rear wheel': str(status.rear_steps),
+            'n': str(status.front_steps - status.rear_steps),
+            'n is certain': str(not status.n_uncertain).lower(),
+            'samples accepted': str(status.accepted),
+            **{f'samples refused: {why}': str(count) for why, count in status.refused.items()},
+            'restarts of the source': str(status.restarts),
+            **_stream(status.cadence, age),
+        },
+    )
 
 
 def phase_text(phase: float) -> str:

@@ -35,9 +35,9 @@ class PhaseParams(NamedTuple):
         Quantity('a strike counts back only when ψ recedes by more than this', 'deg', low=0.0, high=10.0, live=True),
     ] = 1.5
     max_speed: MaxSpeed = 20.0
-    max_future: Annotated[
-        float, Quantity('a stamp further ahead of the clock is refused', 's', low=0.0, live=True)
-    ] = 0.5
+    max_future: Annotated[float, Quantity('a stamp further ahead of the clock is refused', 's', low=0.0, live=True)] = (
+        0.5
+    )
     restart_samples: Annotated[
         int, Quantity('refused samples in a row that agree, and so make a restart of the source', low=2, live=True)
     ] = 5
@@ -115,8 +115,9 @@ class PhaseEstimator:
 
         """
         stamp_ns, front, rear, _, run = joints
-        if not (-LARGEST_ROTATION <= front.angle <= LARGEST_ROTATION
-                and -LARGEST_ROTATION <= rear.angle <= LARGEST_ROTATION):
+        if not (
+            -LARGEST_ROTATION <= front.angle <= LARGEST_ROTATION and -LARGEST_ROTATION <= rear.angle <= LARGEST_ROTATION
+        ):
             self.refuse('not finite')
             return None
         if now_ns and stamp_ns - now_ns > self.params.max_future * 1e9:

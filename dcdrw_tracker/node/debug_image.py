@@ -26,8 +26,9 @@ SHIFT = 4
 """Bits of a pixel's fraction that OpenCV draws with."""
 
 
-def draw(image: Picture, tracked: Tracked, mounts: Mapping[int, Mount], camera: Camera,
-         shapes: tuple[WheelShape, WheelShape]) -> Picture:
+def draw(
+    image: Picture, tracked: Tracked, mounts: Mapping[int, Mount], camera: Camera, shapes: tuple[WheelShape, WheelShape]
+) -> Picture:
     """A copy of a frame in colour, with what was made of it drawn over it.
 
     Args:
@@ -41,8 +42,7 @@ def draw(image: Picture, tracked: Tracked, mounts: Mapping[int, Mount], camera: 
     cv2 = opencv()
     picture = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image.copy()
     for view, shape, colour in zip(tracked.view[1:], shapes, (FRONT_COLOUR, REAR_COLOUR), strict=True):
-        own = [one for one in tracked.detections
-               if (mounts[one.id].wheel == FRONT) == (colour == FRONT_COLOUR)]
+        own = [one for one in tracked.detections if (mounts[one.id].wheel == FRONT) == (colour == FRONT_COLOUR)]
         if view is not None and own:
             _draw_wheel(cv2, picture, _Wheel(own, mounts, camera, tracked.axes), view, shape, colour)
         for one in own:
@@ -69,12 +69,15 @@ class _Wheel:
         return np.asarray(np.rint(pixels * 2**SHIFT), np.int32)
 
 
-def _draw_wheel(cv2: Any, picture: Any, wheel: _Wheel, view: WheelView, shape: WheelShape,
-                colour: tuple[int, int, int]) -> None:
+def _draw_wheel(
+    cv2: Any, picture: Any, wheel: _Wheel, view: WheelView, shape: WheelShape, colour: tuple[int, int, int]
+) -> None:
     pitch = 2.0 * shape.alpha
     stance = -pitch * math.floor((view.rotation + shape.alpha) / pitch)  # the spoke on which it stands
-    feet = [(-shape.length * math.sin(angle), -shape.length * math.cos(angle))
-            for angle in stance + pitch * np.arange(round(math.tau / pitch))]
+    feet = [
+        (-shape.length * math.sin(angle), -shape.length * math.cos(angle))
+        for angle in stance + pitch * np.arange(round(math.tau / pitch))
+    ]
     for index, foot in reversed(list(enumerate(feet))):
         line = wheel.pixels(((0.0, 0.0), foot))
         if line is not None:

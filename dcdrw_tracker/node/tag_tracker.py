@@ -54,8 +54,12 @@ class WheelQuality(NamedTuple):
             return self
         share = 1.0 / min(self.frames + 1, MEMORY)
         return WheelQuality(
-            stamp_ns, self.frames + 1, view.tags, self.error_px + share * (view.error_px - self.error_px),
-            self.size_px + share * (view.size_px - self.size_px))
+            stamp_ns,
+            self.frames + 1,
+            view.tags,
+            self.error_px + share * (view.error_px - self.error_px),
+            self.size_px + share * (view.size_px - self.size_px),
+        )
 
 
 class TrackerStatus(NamedTuple):
@@ -86,8 +90,9 @@ class TagTracker:
 
     """
 
-    def __init__(self, tags: TagParams, view: PairViewParams, track: TrackParams, detector: str = 'aruco',
-                 first_run: int = 1) -> None:
+    def __init__(
+        self, tags: TagParams, view: PairViewParams, track: TrackParams, detector: str = 'aruco', first_run: int = 1
+    ) -> None:
         if detector not in get_args(Backend):
             raise ValueError(f'detector must be {" or ".join(get_args(Backend))}, got {detector!r}')
         self.mounts = {mount.id: mount for mount in mounts(tags)}
@@ -125,8 +130,10 @@ class TagTracker:
             raise ValueError('no camera is known')
         height, width = frame.image.shape[:2]
         if (width, height) != (self._camera.width, self._camera.height):
-            raise ValueError(f'the picture is {width}x{height}, but the camera is calibrated for '
-                             f'{self._camera.width}x{self._camera.height}: let it send that size, or calibrate it anew')
+            raise ValueError(
+                f'the picture is {width}x{height}, but the camera is calibrated for '
+                f'{self._camera.width}x{self._camera.height}: let it send that size, or calibrate it anew'
+            )
         sighting = self._follower.follow(_grey(frame.image), frame.stamp_ns)
         view = self._viewer.view(frame.stamp_ns, sighting.detections)
         axes = self._viewer.plane.axes(math.radians(self._view.roll_deg))
@@ -140,11 +147,21 @@ class TagTracker:
 
     def status(self) -> TrackerStatus:
         """A snapshot."""
-        front, rear = (tuple(mount.id for mount in self.mounts.values() if mount.wheel == wheel)
-                       for wheel in (FRONT, REAR))
+        front, rear = (
+            tuple(mount.id for mount in self.mounts.values() if mount.wheel == wheel) for wheel in (FRONT, REAR)
+        )
         refused = self._refused_before + (self._viewer.refused if self._viewer else 0)
-        return TrackerStatus(self._stamp_ns, self._qualities[FRONT], self._qualities[REAR], (front, rear),
-                             self._duplicate, self._duplicate_ns, self._duplicates, refused, self._angles.status())
+        return TrackerStatus(
+            self._stamp_ns,
+            self._qualities[FRONT],
+            self._qualities[REAR],
+            (front, rear),
+            self._duplicate,
+            self._duplicate_ns,
+            self._duplicates,
+            refused,
+            self._angles.status(),
+        )
 
 
 def _grey(image: Picture) -> Picture:

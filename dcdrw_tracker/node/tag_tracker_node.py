@@ -83,7 +83,8 @@ class TagTrackerNode(Node):
             listen(self, REAR_POSE, partial(self._on_pose, REAR))
         else:
             self._tracker = TagTracker(
-                self._tags, self._view.value, self._track.value, self._source.detector, first_run)
+                self._tags, self._view.value, self._track.value, self._source.detector, first_run
+            )
             self._start_on_pictures()
         report(self, self._diagnose)
 
@@ -129,8 +130,7 @@ class TagTrackerNode(Node):
         self._read = lambda item: item
         self._reader = FrameThread(self._slot)
         if is_device(name):
-            self._reader.film(
-                lambda: CameraDevice(name, self._camera, source.frame_rate, source.pixel_format), name)
+            self._reader.film(lambda: CameraDevice(name, self._camera, source.frame_rate, source.pixel_format), name)
             return
         try:
             video = VideoFile(Path(name), source.frame_rate)
@@ -167,8 +167,9 @@ class TagTrackerNode(Node):
             self._problem = ''
             self._age.renew()
             seconds = time.perf_counter() - begin
-            self._seconds = seconds if math.isnan(self._seconds) else (
-                self._seconds + (seconds - self._seconds) / MEMORY)
+            self._seconds = (
+                seconds if math.isnan(self._seconds) else (self._seconds + (seconds - self._seconds) / MEMORY)
+            )
 
     def _track_wheels(self, item: Any) -> None:
         if self._camera is None:
@@ -189,8 +190,9 @@ class TagTrackerNode(Node):
 
     def _drawn(self, picture: Frame, tracked: Tracked, through: Camera) -> Frame:
         track = self._track.value
-        return picture._replace(image=draw(picture.image, tracked, self._tracker.mounts, through,
-                                           (track.front, track.rear)))
+        return picture._replace(
+            image=draw(picture.image, tracked, self._tracker.mounts, through, (track.front, track.rear))
+        )
 
     # --- poses -----------------------------------------------------------------------------------------------------
 
@@ -212,8 +214,9 @@ class TagTrackerNode(Node):
     def _publish(self, sample: JointSample) -> None:
         if sample.run != self._run:
             self._run = sample.run
-            self.get_logger().warning('the number of turns was lost, or the stamps went back: the steps are counted '
-                                      'afresh')
+            self.get_logger().warning(
+                'the number of turns was lost, or the stamps went back: the steps are counted afresh'
+            )
         self._joint_states.publish(self._writer.write(sample))
 
     def _configure(self, _: object) -> None:
@@ -225,8 +228,11 @@ class TagTrackerNode(Node):
             self._tracker.configure(self._view.value, track)
 
     def _diagnose(self) -> Diagnosis:
-        diagnosis = (diagnose_poses(self._angles.status(), self._source_status()) if self._source.source == POSES
-                     else diagnose_tags(self._tracker.status(), self._source_status()))
+        diagnosis = (
+            diagnose_poses(self._angles.status(), self._source_status())
+            if self._source.source == POSES
+            else diagnose_tags(self._tracker.status(), self._source_status())
+        )
         if diagnosis[:2] != self._said:  # one line whenever it changes, not one per frame
             self._said = diagnosis[:2]
             if diagnosis.level == Level.OK:  # rclpy allows one level per line of code
@@ -240,8 +246,15 @@ class TagTrackerNode(Node):
         taken_late, dropped_late = taken - self._counted[0], dropped - self._counted[1]
         self._counted = taken, dropped
         problem = self._problem or (reader.state if reader and not reader.good else '')
-        return SourceStatus(self._age.seconds, problem, self._waiting_for(), dropped,
-                            dropped_late / max(taken_late + dropped_late, 1), self._unusable, self._seconds)
+        return SourceStatus(
+            self._age.seconds,
+            problem,
+            self._waiting_for(),
+            dropped,
+            dropped_late / max(taken_late + dropped_late, 1),
+            self._unusable,
+            self._seconds,
+        )
 
     def _waiting_for(self) -> str:
         """What to say while nothing comes."""

@@ -36,15 +36,19 @@ def diagnose_tags(status: TrackerStatus, source: SourceStatus) -> Diagnosis:
     """The diagnosis of a tracker that has a camera."""
     level, message = _judge_source(source) or _judge_tags(status) or _judge_angles(status.angles, source)
     front, rear = status.front, status.rear
-    return Diagnosis(level, message, {
-        'tags seen': f'front {_seen(status, front)}, rear {_seen(status, rear)}',
-        'reprojection error': f'front {_px(front.error_px, front)}, rear {_px(rear.error_px, rear)}',
-        'size of the tags': f'front {_px(front.size_px, front)}, rear {_px(rear.size_px, rear)}',
-        'frames with duplicate tags': str(status.duplicates),
-        'tags refused: no fit': str(status.refused_tags),
-        **_angles(status.angles),
-        **_source(source),
-    })
+    return Diagnosis(
+        level,
+        message,
+        {
+            'tags seen': f'front {_seen(status, front)}, rear {_seen(status, rear)}',
+            'reprojection error': f'front {_px(front.error_px, front)}, rear {_px(rear.error_px, rear)}',
+            'size of the tags': f'front {_px(front.size_px, front)}, rear {_px(rear.size_px, rear)}',
+            'frames with duplicate tags': str(status.duplicates),
+            'tags refused: no fit': str(status.refused_tags),
+            **_angles(status.angles),
+            **_source(source),
+        },
+    )
 
 
 def diagnose_poses(status: AnglesStatus, source: SourceStatus) -> Diagnosis:
@@ -86,8 +90,10 @@ def _judge_angles(status: AnglesStatus, source: SourceStatus) -> tuple[Level, st
         if not track.taken:
             return Level.WARN, f'the {wheel} wheel is not tracked yet'
         if not track.travels:
-            return Level.WARN, (f'the hub of the {wheel} wheel does not travel as the wheel rolls: see the parameters '
-                                f'camera_follows and {wheel}.length')
+            return Level.WARN, (
+                f'the hub of the {wheel} wheel does not travel as the wheel rolls: see the parameters '
+                f'camera_follows and {wheel}.length'
+            )
     if source.dropped_share > MANY:
         return Level.WARN, 'tracking both wheels, but frames come faster than they are worked on'
     return Level.OK, 'tracking both wheels'
@@ -101,8 +107,11 @@ def _angles(status: AnglesStatus) -> dict[str, str]:
         'frame rate': f'{cadence.rate:.1f} Hz' if math.isfinite(cadence.rate) else 'unknown',
         'frames dropped': f'{cadence.lost} in {cadence.gaps} gaps, longest {cadence.longest:.3f} s',
         'frames out of order': str(status.out_of_order),
-        **{f'outliers of the {wheel} wheel: {why}': str(count)
-           for wheel, track in wheels for why, count in track.outliers.items()},
+        **{
+            f'outliers of the {wheel} wheel: {why}': str(count)
+            for wheel, track in wheels
+            for why, count in track.outliers.items()
+        },
         **{f'views of the {wheel} wheel that waited for others': str(track.unconfirmed) for wheel, track in wheels},
         'occlusions of more than a step restored': f'front {wheels[0][1].restored}, rear {wheels[1][1].restored}',
         'times the turns were lost': str(status.lost),

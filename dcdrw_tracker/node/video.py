@@ -86,14 +86,14 @@ class CameraDevice:
 
     """
 
-    def __init__(self, source: str, camera: Camera | None = None, frame_rate: float = math.nan,
-                 pixel_format: str = '') -> None:
+    def __init__(
+        self, source: str, camera: Camera | None = None, frame_rate: float = math.nan, pixel_format: str = ''
+    ) -> None:
         cv2 = opencv()
         index = source.removeprefix('/dev/video')
         if index.isdecimal() and not Path(f'/dev/video{index}').exists():
             raise OSError(f'there is no camera at /dev/video{index}')
-        self._capture = (cv2.VideoCapture(int(index), cv2.CAP_V4L2) if index.isdecimal()
-                         else cv2.VideoCapture(source))
+        self._capture = cv2.VideoCapture(int(index), cv2.CAP_V4L2) if index.isdecimal() else cv2.VideoCapture(source)
         if not self._capture.isOpened():
             raise OSError(f'the camera at {source} cannot be opened: is it there, and used by nobody else?')
         wanted: dict[int, float] = {}

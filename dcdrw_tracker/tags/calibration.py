@@ -86,14 +86,25 @@ def calibrate(views: Sequence[PairView], front: WheelShape, rear: WheelShape) ->
     first, second = (_calibrate(name, views, shape) for name, shape in ((FRONT, front), (REAR, rear)))
     apart = math.degrees(first.turn.value - second.turn.value)
     if abs(apart) > math.degrees(LARGEST_ANGLE):
-        raise ValueError(f'the hubs do not travel along one slope: their directions are {abs(apart):.1f}° apart; does '
-                         'the camera stand still, and is it calibrated?')
+        raise ValueError(
+            f'the hubs do not travel along one slope: their directions are {abs(apart):.1f}° apart; does '
+            'the camera stand still, and is it calibrated?'
+        )
     weight1, weight2 = (max(wheel.turn.spread, 1e-9) ** -2 for wheel in (first, second))
-    turn = Estimate((weight1 * first.turn.value + weight2 * second.turn.value) / (weight1 + weight2),
-                    (weight1 + weight2) ** -0.5)
-    return Calibration(turn, *(wheel._replace(zero=Estimate(
-        wheel.zero.value - wheel.turn.value + turn.value, math.hypot(wheel.zero.spread, turn.spread)))
-        for wheel in (first, second)))
+    turn = Estimate(
+        (weight1 * first.turn.value + weight2 * second.turn.value) / (weight1 + weight2), (weight1 + weight2) ** -0.5
+    )
+    return Calibration(
+        turn,
+        *(
+            wheel._replace(
+                zero=Estimate(
+                    wheel.zero.value - wheel.turn.value + turn.value, math.hypot(wheel.zero.spread, turn.spread)
+                )
+            )
+            for wheel in (first, second)
+        ),
+    )
 
 
 def rolled_path(alpha: float, psi: Floats) -> Complexes:
@@ -131,8 +142,14 @@ class _Path(NamedTuple):
     def refined_zero(self, alpha: float, zero: float) -> float:
         """The zero that fits best, near one that nearly does."""
         near = 2.0 * alpha / SCAN
-        return float(minimize_scalar(lambda near: self.misfit(alpha, near), bounds=(zero - near, zero + near),
-                                     method='bounded', options={'xatol': 1e-7}).x)
+        return float(
+            minimize_scalar(
+                lambda near: self.misfit(alpha, near),
+                bounds=(zero - near, zero + near),
+                method='bounded',
+                options={'xatol': 1e-7},
+            ).x
+        )
 
     def solve(self, alpha: float, near: float) -> Floats:
         """What is sought: turn, length, zero, tag_x, tag_y."""
@@ -152,8 +169,10 @@ def _calibrate(name: str, views: Sequence[PairView], shape: WheelShape) -> Wheel
     cells = np.floor((path.psi + zero + alpha) / (2.0 * alpha))
     steps = int(np.ptp(cells))
     if steps < LEAST_STEPS:
-        raise ValueError(f'the {name} wheel takes {steps} steps before the camera, but {LEAST_STEPS} are needed: film '
-                         'a longer way, from further off or with a wider lens')
+        raise ValueError(
+            f'the {name} wheel takes {steps} steps before the camera, but {LEAST_STEPS} are needed: film '
+            'a longer way, from further off or with a wider lens'
+        )
     found = path.solve(alpha, zero)
     _check(name, path, shape, steps, found)
     others = np.array([path.rows(cells != cell).solve(alpha, zero) for cell in np.unique(cells)])
@@ -164,14 +183,16 @@ def _calibrate(name: str, views: Sequence[PairView], shape: WheelShape) -> Wheel
 
 def _longest_path(name: str, views: Sequence[PairView]) -> _Path:
     """The longest way that the wheel was seen to roll without a pause."""
-    seen = [(view.stamp_ns * 1e-9, wheel.rotation, complex(*wheel.hub))
-            for view in views if (wheel := getattr(view, name))]
+    seen = [
+        (view.stamp_ns * 1e-9, wheel.rotation, complex(*wheel.hub)) for view in views if (wheel := getattr(view, name))
+    ]
     if not seen:
         raise ValueError(f'the {name} wheel was not seen')
     time, rotation, hub = (np.array(column) for column in zip(*seen, strict=True))
     cuts = np.flatnonzero(np.diff(time) > LONGEST_PAUSE) + 1
-    paths = [_Path(np.unwrap(part), place)
-             for part, place in zip(np.split(rotation, cuts), np.split(hub, cuts), strict=True)]
+    paths = [
+        _Path(np.unwrap(part), place) for part, place in zip(np.split(rotation, cuts), np.split(hub, cuts), strict=True)
+    ]
     return max(paths, key=lambda path: float(np.ptp(path.psi)))
 
 
@@ -179,14 +200,21 @@ def _check(name: str, path: _Path, shape: WheelShape, steps: int, found: Floats)
     """Refuse what is not the path of a rolling wheel."""
     went, rolled = float(np.ptp(path.hub.real)), steps * shape.step_length
     if not 0.5 < went / rolled < 2.0:
-        raise ValueError(f'the hub of the {name} wheel travels {went:.2f} m in {steps} steps, not about {rolled:.2f} '
-                         f'm: the camera must stand still, not follow the pair; else see size and {name}.length')
+        raise ValueError(
+            f'the hub of the {name} wheel travels {went:.2f} m in {steps} steps, not about {rolled:.2f} '
+            f'm: the camera must stand still, not follow the pair; else see size and {name}.length'
+        )
     misfit = path.misfit(shape.alpha, path.best_zero(shape.alpha))
     if misfit <= LARGEST_MISFIT * shape.length:
         return
     misfits = {spokes: path.misfit(math.pi / spokes, path.best_zero(math.pi / spokes)) for spokes in OTHER_SPOKES}
     best = min(misfits, key=misfits.__getitem__)
-    why = (f'it fits a wheel of {best} spokes, not {shape.spokes:g} ({name}.spokes)'
-           if misfits[best] <= LARGEST_MISFIT * shape.length else 'does the camera stand still, and is it calibrated?')
-    raise ValueError(f'the hub of the {name} wheel does not travel as that of a rolling wheel: it is '
-                     f'{1e3 * misfit:.0f} mm off; {why}')
+    why = (
+        f'it fits a wheel of {best} spokes, not {shape.spokes:g} ({name}.spokes)'
+        if misfits[best] <= LARGEST_MISFIT * shape.length
+        else 'does the camera stand still, and is it calibrated?'
+    )
+    raise ValueError(
+        f'the hub of the {name} wheel does not travel as that of a rolling wheel: it is '
+        f'{1e3 * misfit:.0f} mm off; {why}'
+    )

@@ -99,8 +99,10 @@ class TagDetector:
             return []
         scale = min(BEST_SIDE / side, 2.0)
         region = np.ascontiguousarray(image[y0:y1, x0:x1])
-        return [one._replace(corners=one.corners + np.array((x0, y0)))
-                for one in self.detect(region, (scale,), 0.5 * side * scale)]
+        return [
+            one._replace(corners=one.corners + np.array((x0, y0)))
+            for one in self.detect(region, (scale,), 0.5 * side * scale)
+        ]
 
 
 def _scaled(image: Grey, scale: float) -> Grey:

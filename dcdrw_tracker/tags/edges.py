@@ -41,8 +41,17 @@ def refine(image: NDArray[np.uint8], corners: Floats, cells: int) -> Floats:
         reach = max(min(cell, 6.0) if round_ == 0 else min(0.6 * cell, 5.0), 1.5) + 0.5 * STEP
         across = np.arange(-reach, reach + 0.5 * STEP, STEP)
         points = (start + ALONG[:, None] * along)[:, :, None] + across[:, None] * outward[:, :, None]
-        levels = cv2.remap(image, points.astype(np.float32).reshape(4 * SAMPLES, -1, 2), None, cv2.INTER_LINEAR,
-                           borderMode=cv2.BORDER_REPLICATE).reshape(4, SAMPLES, -1).astype(float)
+        levels = (
+            cv2.remap(
+                image,
+                points.astype(np.float32).reshape(4 * SAMPLES, -1, 2),
+                None,
+                cv2.INTER_LINEAR,
+                borderMode=cv2.BORDER_REPLICATE,
+            )
+            .reshape(4, SAMPLES, -1)
+            .astype(float)
+        )
         middle = 0.5 * (across[1:] + across[:-1])
         rise = np.maximum(np.diff(levels, axis=2), 0.0) * (1.0 - (middle / reach) ** 2)
         weight = rise.sum(axis=2)
@@ -67,5 +76,6 @@ def _meet(corners: Floats, along: Floats, outward: Floats, offset: Floats, weigh
         before, previous = np.roll(start, 1, axis=0), np.roll(heading, 1, axis=0)
         gap = start - before
         share = (gap[:, 0] * heading[:, 1] - gap[:, 1] * heading[:, 0]) / (
-            previous[:, 0] * heading[:, 1] - previous[:, 1] * heading[:, 0])
+            previous[:, 0] * heading[:, 1] - previous[:, 1] * heading[:, 0]
+        )
         return np.asarray(before + share[:, None] * previous)

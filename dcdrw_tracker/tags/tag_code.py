@@ -31,8 +31,9 @@ class TagReader:
         self._inner = ring < ring.max() - 1.0
         plane = np.stack((np.ones_like(x), x, y), axis=-1)
         # Levels of the white and of the black ring, each fitted by a plane: light is seldom even.
-        self._planes = [plane[self._inner | self._black] @ np.linalg.pinv(plane[border])
-                        for border in (self._white, self._black)]
+        self._planes = [
+            plane[self._inner | self._black] @ np.linalg.pinv(plane[border]) for border in (self._white, self._black)
+        ]
         middle = np.add.outer(np.arange(across) - 0.5 * (across - 1), SPREAD).ravel()
         self._points = np.stack(np.meshgrid(middle, middle), axis=-1).astype(np.float32)
         half = 0.5 * (across - 2)
@@ -45,8 +46,9 @@ class TagReader:
         points = cv2.perspectiveTransform(self._points, homography)
         levels = cv2.remap(image, points, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(float)
         levels = levels.reshape(across, 2, across, 2).mean(axis=(1, 3))
-        white, black = (plane @ levels[border]
-                        for plane, border in zip(self._planes, (self._white, self._black), strict=True))
+        white, black = (
+            plane @ levels[border] for plane, border in zip(self._planes, (self._white, self._black), strict=True)
+        )
         around = np.pad(levels, 1, mode='edge')
         around = around[1:-1, :-2] + around[1:-1, 2:] + around[:-2, 1:-1] + around[2:, 1:-1]
         sharp = levels + SHARPEN * (4.0 * levels - around)

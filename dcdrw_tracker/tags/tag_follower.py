@@ -48,8 +48,9 @@ class TagFollower:
     def follow(self, image: NDArray[np.uint8], stamp_ns: int) -> Sighting:
         """The tags in the next frame: grey, (height, width)."""
         self._frames += 1
-        self._tracks = {tag: track for tag, track in self._tracks.items()
-                        if 0 <= stamp_ns - track.stamp_ns <= FORGET_NS}
+        self._tracks = {
+            tag: track for tag, track in self._tracks.items() if 0 <= stamp_ns - track.stamp_ns <= FORGET_NS
+        }
         found: dict[int, Detection] = {}
         duplicates: set[int] = set()
         for tag, track in self._tracks.items():

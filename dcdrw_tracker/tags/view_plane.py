@@ -136,8 +136,17 @@ class ViewPlane:
         from scipy.optimize import least_squares  # a second to import, and few need it
 
         def solve(start: Floats) -> tuple[float, Floats, Floats]:
-            done = least_squares(residuals, start, loss='soft_l1', f_scale=OUTLIER_PX, bounds=(-steepest, steepest),
-                                 x_scale=0.1, xtol=1e-6, ftol=1e-6, max_nfev=30)
+            done = least_squares(
+                residuals,
+                start,
+                loss='soft_l1',
+                f_scale=OUTLIER_PX,
+                bounds=(-steepest, steepest),
+                x_scale=0.1,
+                xtol=1e-6,
+                ftol=1e-6,
+                max_nfev=30,
+            )
             return float(done.cost), done.x, done.jac
 
         # Seen from afar a plane and its mirror about the line of sight look alike: both are tried.
@@ -147,7 +156,7 @@ class ViewPlane:
         if mirror[0] < best[0]:
             best, mirror = mirror, best
         cost, self.slant, jacobian = best
-        variance = max(2.0 * cost / (4 * len(rays)), NOISE_PX ** 2)  # of 8 numbers of a tag its similarity takes 4
+        variance = max(2.0 * cost / (4 * len(rays)), NOISE_PX**2)  # of 8 numbers of a tag its similarity takes 4
         spread = variance * np.linalg.inv(jacobian.T @ jacobian + 1e-12 * np.eye(2))
         apart = float(np.linalg.norm(mirror[1] - self.slant))
         rivals = 2.0 * (mirror[0] - cost) < RIVAL * variance

@@ -21,8 +21,9 @@ Complexes = NDArray[np.complex128]
 class PairViewParams(NamedTuple):
     """How the camera stands, and what is no view of a wheel."""
 
-    roll_deg: Annotated[float, Quantity('how far the camera leans to its right, by its level', 'deg', low=-180.0,
-                                        high=180.0, live=True)] = 0.0
+    roll_deg: Annotated[
+        float, Quantity('how far the camera leans to its right, by its level', 'deg', low=-180.0, high=180.0, live=True)
+    ] = 0.0
     max_error: Annotated[
         float, Quantity("reprojection error beyond which a tag is refused, of the tag's side", above=0.0, live=True)
     ] = 0.06
@@ -67,8 +68,9 @@ class _Tag(NamedTuple):
 class PairViewer:
     """Turns the tags of each frame into views of both wheels, and learns meanwhile how the wheels' plane lies."""
 
-    def __init__(self, mounts: Iterable[Mount], camera: Camera, slope: float,
-                 params: PairViewParams | None = None) -> None:
+    def __init__(
+        self, mounts: Iterable[Mount], camera: Camera, slope: float, params: PairViewParams | None = None
+    ) -> None:
         self.params = params or PairViewParams()
         self.slope = slope
         """γ [rad]."""
@@ -78,14 +80,18 @@ class PairViewer:
         self.refused = 0
         """Tags that fitted neither the plane nor their wheel."""
         self._tags: Mapping[int, tuple[Mount, Complexes]] = {
-            mount.id: (mount, seen(corners(mount))) for mount in mounts}
+            mount.id: (mount, seen(corners(mount))) for mount in mounts
+        }
 
     def view(self, stamp_ns: int, detections: Iterable[Detection]) -> PairView:
         """Both wheels in a frame; tags that are not mounted are ignored."""
         known = [one for one in detections if one.id in self._tags]
         rays = self._camera.rays(np.concatenate([one.corners for one in known])) if known else np.empty((0, 2))
-        tags = [_Tag(*self._tags[one.id], own, one.side)
-                for one, own in zip(known, rays.reshape(-1, 4, 2), strict=True) if np.isfinite(own).all()]
+        tags = [
+            _Tag(*self._tags[one.id], own, one.side)
+            for one, own in zip(known, rays.reshape(-1, 4, 2), strict=True)
+            if np.isfinite(own).all()
+        ]
         self.plane.feed(Observation(tag.mount.wheel, tag.rays, tag.shape) for tag in tags)
         axes = self.plane.axes(math.radians(self.params.roll_deg))
         front, rear = (self._wheel([tag for tag in tags if tag.mount.wheel == wheel], axes) for wheel in (FRONT, REAR))
@@ -101,9 +107,9 @@ class PairViewer:
                 self.refused += len(tags)
                 return None
             self.refused += 1
-            without = {i: self._fit(tags[:i] + tags[i + 1:], axes) for i in range(len(tags))}
+            without = {i: self._fit(tags[:i] + tags[i + 1 :], axes) for i in range(len(tags))}
             worst = min(without, key=lambda i: without[i].error_px)
-            view, tags = without[worst], tags[:worst] + tags[worst + 1:]
+            view, tags = without[worst], tags[:worst] + tags[worst + 1 :]
         return view
 
     def _fit(self, tags: list[_Tag], axes: PlaneAxes) -> WheelView:
@@ -112,7 +118,7 @@ class PairViewer:
         rays = np.concatenate([tag.rays for tag in tags])
         c, s = fit_similarity(shape, axes.flatten(rays))
         off = (axes.unflatten(c + s * shape) - rays) * self._focal
-        error_px = math.sqrt(float((off ** 2).sum(axis=1).mean()))
+        error_px = math.sqrt(float((off**2).sum(axis=1).mean()))
         size_px = sum(tag.side for tag in tags) / len(tags)
         rotation = (float(np.angle(s)) - self.slope) % math.tau
         along, normal = unseen(c / abs(s), slope=self.slope).tolist()

@@ -21,15 +21,19 @@ LEAST_LEVER = 0.5
 """A body's axis must lie at least so far in the plane of its wheel, as a share of its length."""
 
 OffsetDeg = Annotated[
-    float, Quantity("ψ of the wheel while that axis of its body lies along the slope's normal", 'deg')]
+    float, Quantity("ψ of the wheel while that axis of its body lies along the slope's normal", 'deg')
+]
 
 
 class PoseParams(NamedTuple):
     """How the bodies that are tracked lie in the wheels, and the slope in the room (z up)."""
 
     heading_deg: Annotated[
-        float, Quantity('direction of downhill in the room, from x towards y', 'deg',
-                        derived='from the rear hub to the front one')] = math.nan
+        float,
+        Quantity(
+            'direction of downhill in the room, from x towards y', 'deg', derived='from the rear hub to the front one'
+        ),
+    ] = math.nan
     spoke_axis: Annotated[str, Quantity("axis of each wheel's body that lies along a spoke: x, y or z")] = 'z'
     front_offset_deg: OffsetDeg = 0.0
     rear_offset_deg: OffsetDeg = 0.0
@@ -108,8 +112,10 @@ class PosePairs:
         """ψ is the angle of the spoke's axis from the slope's normal towards downhill."""
         downhill, normal = basis @ _axis(pose.orientation, self._axis)
         if math.hypot(downhill, normal) < LEAST_LEVER:
-            raise ValueError(f"the {AXES[self._axis]} axis of the {wheel} wheel's body lies along its axle: "
-                             'set spoke_axis to one that lies along a spoke')
+            raise ValueError(
+                f"the {AXES[self._axis]} axis of the {wheel} wheel's body lies along its axle: "
+                'set spoke_axis to one that lies along a spoke'
+            )
         x, y = basis @ np.array(pose.position)
         return _Seen(pose.stamp_ns, math.atan2(downhill, normal) + self._offsets[wheel], (float(x), float(y)))
 

@@ -96,8 +96,9 @@ class StanceFilter:
         self.rate += 0.5 * (acceleration + self._acceleration()) * dt
         half = 0.5 * dt**2
         step = np.array([[1.0 + growth * half, dt, half], [growth * dt, 1.0 + growth * half, dt], [0.0, 0.0, 1.0]])
-        noise = PULL_DRIFT**2 * np.array([
-            [dt**5 / 20, dt**4 / 8, dt**3 / 6], [dt**4 / 8, dt**3 / 3, dt**2 / 2], [dt**3 / 6, dt**2 / 2, dt]])
+        noise = PULL_DRIFT**2 * np.array(
+            [[dt**5 / 20, dt**4 / 8, dt**3 / 6], [dt**4 / 8, dt**3 / 3, dt**2 / 2], [dt**3 / 6, dt**2 / 2, dt]]
+        )
         self._covariance = step @ self._covariance @ step.T + noise
 
     def _strike(self, direction: int) -> None:

@@ -70,14 +70,21 @@ class WheelAngles:
         if not (front and rear):
             return None
         self._samples += 1
-        return JointSample(
-            view.stamp_ns, Turn(front.psi, front.rate), Turn(rear.psi, rear.rate), run=self._run)
+        return JointSample(view.stamp_ns, Turn(front.psi, front.rate), Turn(rear.psi, rear.rate), run=self._run)
 
     def status(self) -> AnglesStatus:
         """A snapshot."""
         front, rear = self._tracks
-        return AnglesStatus(self._views, self._samples, self._out_of_order, self._run, self._run - self._first_run,
-                            self._cadence.status(), front.status(), rear.status())
+        return AnglesStatus(
+            self._views,
+            self._samples,
+            self._out_of_order,
+            self._run,
+            self._run - self._first_run,
+            self._cadence.status(),
+            front.status(),
+            rear.status(),
+        )
 
     def _start_anew(self, stamp_ns: int) -> None:
         self._run += 1
@@ -86,8 +93,10 @@ class WheelAngles:
             track.forget()
 
     def _fixed(self, pair: PairView) -> tuple[Taken | None, Taken | None]:
-        front, rear = (track.take(pair.stamp_ns, view, view.hub[0]) if view else None
-                       for track, view in zip(self._tracks, pair[1:], strict=True))
+        front, rear = (
+            track.take(pair.stamp_ns, view, view.hub[0]) if view else None
+            for track, view in zip(self._tracks, pair[1:], strict=True)
+        )
         return front, rear
 
     def _followed(self, pair: PairView) -> tuple[Taken | None, Taken | None]:

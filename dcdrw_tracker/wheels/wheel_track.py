@@ -35,19 +35,35 @@ class TrackParams(NamedTuple):
     rear: WheelShape = WheelShape()
     slope: Slope = RigParams().slope
     camera_follows: Annotated[
-        bool, Quantity('the camera travels with the pair, or the ground under both (treadmill): how often a wheel has '
-                       'turned is then told by the distance of the hubs')] = False
+        bool,
+        Quantity(
+            'the camera travels with the pair, or the ground under both (treadmill): how often a wheel has '
+            'turned is then told by the distance of the hubs'
+        ),
+    ] = False
     max_speed: MaxSpeed = PhaseParams().max_speed
     max_acceleration: Annotated[
-        float, Quantity('beyond what gravity and strikes do, a wheel gains at most so much speed', 'rad/s²', above=0.0,
-                        live=True)] = 20.0
+        float,
+        Quantity(
+            'beyond what gravity and strikes do, a wheel gains at most so much speed', 'rad/s²', above=0.0, live=True
+        ),
+    ] = 20.0
     max_jump_deg: Annotated[
-        float, Quantity('a rotation further than this from where the wheel can be is an outlier', 'deg', above=0.0,
-                        high=10.0, live=True)] = 3.0
+        float,
+        Quantity(
+            'a rotation further than this from where the wheel can be is an outlier',
+            'deg',
+            above=0.0,
+            high=10.0,
+            live=True,
+        ),
+    ] = 3.0
     max_error_px: Annotated[
-        float, Quantity('a view whose reprojection error is larger is an outlier', 'px', above=0.0, live=True)] = 3.0
+        float, Quantity('a view whose reprojection error is larger is an outlier', 'px', above=0.0, live=True)
+    ] = 3.0
     relock_views: Annotated[
-        int, Quantity('outliers in a row that agree, and so are the truth', low=START_VIEWS, live=True)] = 10
+        int, Quantity('outliers in a row that agree, and so are the truth', low=START_VIEWS, live=True)
+    ] = 10
 
 
 class TrackStatus(NamedTuple):
@@ -158,8 +174,16 @@ class WheelTrack:
     def status(self) -> TrackStatus:
         """A snapshot."""
         rate = self._filter.rate if self._filter else math.nan
-        return TrackStatus(self._stamp_ns, self._psi, rate, self._taken, self._outliers.copy(), self._unconfirmed,
-                           self._restored, self._travel.steady)
+        return TrackStatus(
+            self._stamp_ns,
+            self._psi,
+            rate,
+            self._taken,
+            self._outliers.copy(),
+            self._unconfirmed,
+            self._restored,
+            self._travel.steady,
+        )
 
     def _since(self, stamp_ns: int) -> float:
         """Time since a view was last taken [s]."""
@@ -221,7 +245,8 @@ class WheelTrack:
         path.reverse()
         rate = (path[-1] - path[0]) / ((stamp_ns - held[0].stamp_ns) * 1e-9)
         self._filter = StanceFilter(
-            self._shape.length, self._shape.alpha, self._params.slope, path[0], rate, _spread(held[0].view))
+            self._shape.length, self._shape.alpha, self._params.slope, path[0], rate, _spread(held[0].view)
+        )
         for earlier, later, seen in zip(held, held[1:], path[1:], strict=False):
             self._filter.predict((later.stamp_ns - earlier.stamp_ns) * 1e-9)
             self._filter.correct(seen, _spread(later.view))

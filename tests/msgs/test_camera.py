@@ -74,10 +74,22 @@ def test_what_is_written_is_read(model, tmp_path):
 def test_the_file_has_every_field_that_ros_drivers_read(tmp_path):
     write_camera(tmp_path / 'camera.yaml', lens('plumb_bob'), 'tripod')
     content = yaml.safe_load((tmp_path / 'camera.yaml').read_text())
-    assert list(content) == ['image_width', 'image_height', 'camera_name', 'camera_matrix', 'distortion_model',
-                             'distortion_coefficients', 'rectification_matrix', 'projection_matrix']
-    shapes = {'camera_matrix': (3, 3), 'distortion_coefficients': (1, 5), 'rectification_matrix': (3, 3),
-              'projection_matrix': (3, 4)}
+    assert list(content) == [
+        'image_width',
+        'image_height',
+        'camera_name',
+        'camera_matrix',
+        'distortion_model',
+        'distortion_coefficients',
+        'rectification_matrix',
+        'projection_matrix',
+    ]
+    shapes = {
+        'camera_matrix': (3, 3),
+        'distortion_coefficients': (1, 5),
+        'rectification_matrix': (3, 3),
+        'projection_matrix': (3, 4),
+    }
     for name, (rows, cols) in shapes.items():
         assert (content[name]['rows'], content[name]['cols'], len(content[name]['data'])) == (rows, cols, rows * cols)
 
@@ -88,25 +100,37 @@ def test_a_lens_without_coefficients_is_straight():
 
 
 def content(**changes: object) -> dict[str, object]:
-    whole = {'image_width': 1280, 'image_height': 720, 'camera_matrix': {'data': MATRIX},
-             'distortion_model': 'plumb_bob', 'distortion_coefficients': {'data': LENSES['plumb_bob']}, **changes}
+    whole = {
+        'image_width': 1280,
+        'image_height': 720,
+        'camera_matrix': {'data': MATRIX},
+        'distortion_model': 'plumb_bob',
+        'distortion_coefficients': {'data': LENSES['plumb_bob']},
+        **changes,
+    }
     return {name: value for name, value in whole.items() if value is not None}
 
 
-@pytest.mark.parametrize(('changes', 'message'), [
-    ({'image_width': None}, r'camera\.yaml has no image_width: is it a camera_info file'),
-    ({'camera_matrix': None}, r'camera\.yaml has no camera_matrix\.data'),
-    ({'camera_matrix': {'rows': 3}}, r'camera\.yaml has no camera_matrix\.data'),
-    ({'distortion_coefficients': None}, r'has no distortion_coefficients\.data'),
-    ({'image_height': 'tall'}, r"image_height must be a whole number, got 'tall'"),
-    ({'image_height': 0}, 'image_width and image_height must be at least 1, got 1280 and 0'),
-    ({'camera_matrix': {'data': [1.0]}}, r'camera_matrix\.data must be 9 finite numbers, got \[1\.0\]'),
-    ({'camera_matrix': {'data': ['a'] * 9}}, r'camera_matrix\.data must be a list of numbers'),
-    ({'camera_matrix': {'data': [0.0] * 9}}, r'focal lengths .* must be > 0, got 0 and 0; calibrate the camera first'),
-    ({'distortion_model': 'equidistant'}, "must be plumb_bob or rational_polynomial, got 'equidistant'"),
-    ({'distortion_coefficients': {'data': [0.1, 0.2]}}, r'plumb_bob must be 5 finite numbers, got \[0\.1, 0\.2\]'),
-    ({'distortion_coefficients': {'data': [math.nan] * 5}}, 'plumb_bob must be 5 finite numbers'),
-])
+@pytest.mark.parametrize(
+    ('changes', 'message'),
+    [
+        ({'image_width': None}, r'camera\.yaml has no image_width: is it a camera_info file'),
+        ({'camera_matrix': None}, r'camera\.yaml has no camera_matrix\.data'),
+        ({'camera_matrix': {'rows': 3}}, r'camera\.yaml has no camera_matrix\.data'),
+        ({'distortion_coefficients': None}, r'has no distortion_coefficients\.data'),
+        ({'image_height': 'tall'}, r"image_height must be a whole number, got 'tall'"),
+        ({'image_height': 0}, 'image_width and image_height must be at least 1, got 1280 and 0'),
+        ({'camera_matrix': {'data': [1.0]}}, r'camera_matrix\.data must be 9 finite numbers, got \[1\.0\]'),
+        ({'camera_matrix': {'data': ['a'] * 9}}, r'camera_matrix\.data must be a list of numbers'),
+        (
+            {'camera_matrix': {'data': [0.0] * 9}},
+            r'focal lengths .* must be > 0, got 0 and 0; calibrate the camera first',
+        ),
+        ({'distortion_model': 'equidistant'}, "must be plumb_bob or rational_polynomial, got 'equidistant'"),
+        ({'distortion_coefficients': {'data': [0.1, 0.2]}}, r'plumb_bob must be 5 finite numbers, got \[0\.1, 0\.2\]'),
+        ({'distortion_coefficients': {'data': [math.nan] * 5}}, 'plumb_bob must be 5 finite numbers'),
+    ],
+)
 def test_a_bad_file_is_refused_with_the_key_that_is_to_blame(changes, message, tmp_path):
     path = tmp_path / 'camera.yaml'
     path.write_text(yaml.safe_dump(content(**changes)))
@@ -115,8 +139,9 @@ def test_a_bad_file_is_refused_with_the_key_that_is_to_blame(changes, message, t
     assert 'camera.yaml' in str(error.value)
 
 
-@pytest.mark.parametrize(('text', 'message'), [
-    ('a: [', 'is not YAML'), ('', 'has no image_width'), ('3', 'has no image_width')])
+@pytest.mark.parametrize(
+    ('text', 'message'), [('a: [', 'is not YAML'), ('', 'has no image_width'), ('3', 'has no image_width')]
+)
 def test_what_is_no_camera_file_is_refused(text, message, tmp_path):
     path = tmp_path / 'camera.yaml'
     path.write_text(text)

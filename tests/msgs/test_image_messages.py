@@ -68,11 +68,14 @@ def test_compressed_frames_are_read():
         assert (read.image == image).all()
 
 
-@pytest.mark.parametrize(('bad', 'error'), [
-    (message('yuv422', COLOUR), "the encoding 'yuv422' is not read; let the camera send mono8"),
-    (message('bgr8', GREY), '35 bytes in rows of 5 are no bgr8 picture of 5x7'),
-    (Image(encoding='mono8', width=5, step=5), '0 bytes in rows of 5 are no mono8 picture of 5x0'),
-])
+@pytest.mark.parametrize(
+    ('bad', 'error'),
+    [
+        (message('yuv422', COLOUR), "the encoding 'yuv422' is not read; let the camera send mono8"),
+        (message('bgr8', GREY), '35 bytes in rows of 5 are no bgr8 picture of 5x7'),
+        (Image(encoding='mono8', width=5, step=5), '0 bytes in rows of 5 are no mono8 picture of 5x0'),
+    ],
+)
 def test_what_is_no_picture_is_told(bad, error):
     with pytest.raises(ValueError, match=error):
         frame(bad)

@@ -31,8 +31,11 @@ def test_stamps_survive(stamp):
     assert stamp_ns(to_stamp(stamp)) == stamp
 
 
-@given(st.builds(JointSample, stamps, turns, turns, st.builds(CouplerSample, numbers, numbers, numbers),
-                 st.integers(0, 2**63)))
+@given(
+    st.builds(
+        JointSample, stamps, turns, turns, st.builds(CouplerSample, numbers, numbers, numbers), st.integers(0, 2**63)
+    )
+)
 def test_joint_samples_survive(sample):
     assert JointSampleReader().read(JointSampleWriter().write(sample)) == sample
 
@@ -42,7 +45,7 @@ def test_phase_samples_survive(sample):
     assert PhaseSampleReader().read(PhaseSampleWriter().write(sample)) == sample
 
 
-@given(st.builds(Footfall, st.sampled_from(['front', 'rear']), stamps, numbers, st.integers(-10**6, 10**6)))
+@given(st.builds(Footfall, st.sampled_from(['front', 'rear']), stamps, numbers, st.integers(-(10**6), 10**6)))
 def test_footfalls_survive(fall):
     assert footfall(footfall_message(fall)) == fall
 
@@ -63,12 +66,15 @@ def test_reader_follows_a_source_that_changes_its_order():
     assert str(first) == str(second)  # NaN differs from itself
 
 
-@pytest.mark.parametrize(('names', 'positions', 'message'), [
-    ([], [], 'joint front_wheel is missing; the message names none'),
-    (['front_wheel', 'Rear'], [1.0, 2.0], 'joint rear_wheel is missing; the message names front_wheel, Rear'),
-    (['front_wheel', 'rear_wheel'], [1.0], '2 joints are named but 1 positions given'),
-    (['front_wheel', 'rear_wheel', 'rear_wheel'], [1.0, 2.0, 3.0], 'joint rear_wheel stands twice'),
-])
+@pytest.mark.parametrize(
+    ('names', 'positions', 'message'),
+    [
+        ([], [], 'joint front_wheel is missing; the message names none'),
+        (['front_wheel', 'Rear'], [1.0, 2.0], 'joint rear_wheel is missing; the message names front_wheel, Rear'),
+        (['front_wheel', 'rear_wheel'], [1.0], '2 joints are named but 1 positions given'),
+        (['front_wheel', 'rear_wheel', 'rear_wheel'], [1.0, 2.0, 3.0], 'joint rear_wheel stands twice'),
+    ],
+)
 def test_what_cannot_be_read_is_named(names, positions, message):
     with pytest.raises(ValueError, match=message):
         JointSampleReader().read(JointState(name=names, position=positions))

@@ -31,9 +31,17 @@ class Outer(NamedTuple):
 
 
 inner = st.builds(Inner, st.floats(0.0, 1e9, exclude_min=True), st.integers(1, 9))
-outer = st.builds(Outer, inner, inner, st.booleans(), st.text(), st.floats(allow_nan=False, allow_infinity=False),
-                  st.floats(-1.0, 1.0), st.lists(st.integers(0, 10**9)).map(tuple),
-                  st.lists(st.floats(1e-9, 1e9)).map(tuple))
+outer = st.builds(
+    Outer,
+    inner,
+    inner,
+    st.booleans(),
+    st.text(),
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.floats(-1.0, 1.0),
+    st.lists(st.integers(0, 10**9)).map(tuple),
+    st.lists(st.floats(1e-9, 1e9)).map(tuple),
+)
 
 
 @given(outer)
@@ -50,7 +58,12 @@ def test_what_is_absent_takes_its_default(names):
 
 def test_fields_come_flat_in_the_order_of_declaration_with_the_defaults_of_their_group():
     assert [(field.name, field.default) for field in fields(Outer)][:5] == [
-        ('left.size', 1.0), ('left.count', 3), ('right.size', 2.0), ('right.count', 3), ('flag', False)]
+        ('left.size', 1.0),
+        ('left.count', 3),
+        ('right.size', 2.0),
+        ('right.count', 3),
+        ('flag', False),
+    ]
     assert next(field for field in fields(Outer) if field.name == 'rest').quantity.live
 
 
@@ -76,33 +89,36 @@ def test_a_list_may_be_empty(nothing):
     assert build(Outer, {'ids': nothing}).ids == ()
 
 
-@pytest.mark.parametrize(('values', 'message'), [
-    ({'ids': 3}, 'ids must be a list, got 3'),
-    ({'ids': '34'}, "ids must be a list, got '34'"),
-    ({'ids': [3, -1]}, r'ids\[1\] must be ≥ 0, got -1'),
-    ({'ids': [3, 0.5]}, r'ids\[1\] must be a whole number, got 0\.5'),
-    ({'ids': [True]}, r'ids\[0\] must be a whole number, got True'),
-    ({'sizes': [1.0, 'x']}, r"sizes\[1\] must be a number, got 'x'"),
-    ({'sizes': [0.0]}, r'sizes\[0\] must be > 0 m, got 0'),
-    ({'left.size': 0}, r'left\.size must be > 0 m, got 0'),
-    ({'left.size': 'large'}, r"left\.size must be a number, got 'large'"),
-    ({'left.size': True}, r'left\.size must be a number, got True'),
-    ({'left.size': None}, r'left\.size must be a number, got None'),
-    ({'left.size': math.nan}, r'left\.size must be > 0 m, got nan'),
-    ({'left.size': math.inf}, r'left\.size must be > 0 m, got inf'),
-    ({'right.count': 2.5}, r'right\.count must be a whole number, got 2\.5'),
-    ({'right.count': 0}, r'right\.count must be ≥ 1, ≤ 9, got 0'),
-    ({'right.count': 10}, r'right\.count must be ≥ 1, ≤ 9, got 10'),
-    ({'right.count': math.nan}, r'right\.count must be .*, got nan'),
-    ({'right.count': math.inf}, r'right\.count must be .*, got inf'),
-    ({'left.size': 10**400}, r'left\.size must be > 0 m, got 1000'),
-    ({'flag': 1}, 'flag must be true or false, got 1'),
-    ({'name': 3}, 'name must be a string, got 3'),
-    ({'rest': math.inf}, 'rest must be finite s, got inf'),
-    ({'ratio': -1.1}, 'ratio must be ≥ -1, ≤ 1, got -1.1'),
-    ({'rigth.size': 1.0}, r'rigth\.size is not a parameter \(rig\.yaml\); did you mean right\.size\?'),
-    ({'zzz': 1.0}, r'zzz is not a parameter \(rig\.yaml\); known are left\.size, left\.count'),
-])
+@pytest.mark.parametrize(
+    ('values', 'message'),
+    [
+        ({'ids': 3}, 'ids must be a list, got 3'),
+        ({'ids': '34'}, "ids must be a list, got '34'"),
+        ({'ids': [3, -1]}, r'ids\[1\] must be ≥ 0, got -1'),
+        ({'ids': [3, 0.5]}, r'ids\[1\] must be a whole number, got 0\.5'),
+        ({'ids': [True]}, r'ids\[0\] must be a whole number, got True'),
+        ({'sizes': [1.0, 'x']}, r"sizes\[1\] must be a number, got 'x'"),
+        ({'sizes': [0.0]}, r'sizes\[0\] must be > 0 m, got 0'),
+        ({'left.size': 0}, r'left\.size must be > 0 m, got 0'),
+        ({'left.size': 'large'}, r"left\.size must be a number, got 'large'"),
+        ({'left.size': True}, r'left\.size must be a number, got True'),
+        ({'left.size': None}, r'left\.size must be a number, got None'),
+        ({'left.size': math.nan}, r'left\.size must be > 0 m, got nan'),
+        ({'left.size': math.inf}, r'left\.size must be > 0 m, got inf'),
+        ({'right.count': 2.5}, r'right\.count must be a whole number, got 2\.5'),
+        ({'right.count': 0}, r'right\.count must be ≥ 1, ≤ 9, got 0'),
+        ({'right.count': 10}, r'right\.count must be ≥ 1, ≤ 9, got 10'),
+        ({'right.count': math.nan}, r'right\.count must be .*, got nan'),
+        ({'right.count': math.inf}, r'right\.count must be .*, got inf'),
+        ({'left.size': 10**400}, r'left\.size must be > 0 m, got 1000'),
+        ({'flag': 1}, 'flag must be true or false, got 1'),
+        ({'name': 3}, 'name must be a string, got 3'),
+        ({'rest': math.inf}, 'rest must be finite s, got inf'),
+        ({'ratio': -1.1}, 'ratio must be ≥ -1, ≤ 1, got -1.1'),
+        ({'rigth.size': 1.0}, r'rigth\.size is not a parameter \(rig\.yaml\); did you mean right\.size\?'),
+        ({'zzz': 1.0}, r'zzz is not a parameter \(rig\.yaml\); known are left\.size, left\.count'),
+    ],
+)
 def test_a_bad_value_is_refused_by_name(values, message):
     with pytest.raises(ValueError, match=message) as error:
         build(Outer, values, 'rig.yaml')

@@ -37,13 +37,16 @@ def test_coupler_and_slope_may_change_while_a_node_runs_and_the_wheels_may_not()
     assert {field.name for field in fields(RigParams) if field.quantity.live} == {'k', 'b', 'D0', 'slope'}
 
 
-@pytest.mark.parametrize(('rig', 'message'), [
-    (RigParams(WheelParams(spokes=3)), r'front\.spokes must be ≥ 4'),
-    (RigParams(WheelParams(length=math.nan)), r'front\.length must be > 0 m'),
-    (RigParams(b=-0.1), 'b must be ≥ 0 N·s/m'),
-    (RigParams(slope=1.0), 'slope must be ≥ -0.785398, ≤ 0.785398 rad'),
-    (RigParams(D0=-1.0), 'D0 must be ≥ 0 m'),
-])
+@pytest.mark.parametrize(
+    ('rig', 'message'),
+    [
+        (RigParams(WheelParams(spokes=3)), r'front\.spokes must be ≥ 4'),
+        (RigParams(WheelParams(length=math.nan)), r'front\.length must be > 0 m'),
+        (RigParams(b=-0.1), 'b must be ≥ 0 N·s/m'),
+        (RigParams(slope=1.0), 'slope must be ≥ -0.785398, ≤ 0.785398 rad'),
+        (RigParams(D0=-1.0), 'D0 must be ≥ 0 m'),
+    ],
+)
 def test_impossible_rigs_are_refused_by_name(rig, message):
     with pytest.raises(ValueError, match=message):
         check(rig)

@@ -40,15 +40,28 @@ def integrate(rig: RigParams, state, seconds: float, method: str = 'DOP853') -> 
     wheels, strikes, n, t, y = (rig.front, rig.rear), [], [0, 0], 0.0, np.array(state, float)
     events = []
     for i, wheel in enumerate(wheels):
+
         def reaches(t, y, i=i, alpha=wheel.alpha):
             return y[2 * i] - alpha
+
         reaches.terminal, reaches.direction = True, 1
         events.append(reaches)
     while t < seconds:
-        S = rig.S0 + n[0] * 2 * rig.front.length * math.sin(rig.front.alpha) \
+        S = (
+            rig.S0
+            + n[0] * 2 * rig.front.length * math.sin(rig.front.alpha)
             - n[1] * 2 * rig.rear.length * math.sin(rig.rear.alpha)
-        solution = solve_ivp(lambda t, y, S=S: paper_rates(rig, S, y), (t, seconds), y, method, events=events,
-                             rtol=1e-13, atol=1e-15, max_step=0.02 if method == 'DOP853' else np.inf)
+        )
+        solution = solve_ivp(
+            lambda t, y, S=S: paper_rates(rig, S, y),
+            (t, seconds),
+            y,
+            method,
+            events=events,
+            rtol=1e-13,
+            atol=1e-15,
+            max_step=0.02 if method == 'DOP853' else np.inf,
+        )
         t, y = solution.t[-1], solution.y[:, -1]
         for i, wheel in enumerate(wheels):
             if solution.t_events[i].size:

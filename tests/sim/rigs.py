@@ -18,8 +18,17 @@ def between(low, high):
 
 
 wheels = st.builds(WheelParams, between(0.5, 1.5), between(5.0, 20.0), between(9.0, 16.0))
-rigs = st.builds(RigParams, wheels, wheels, k=between(0.0, 50.0), b=between(0.0, 150.0), D0=between(0.5, 2.0),
-                 S0=between(0.8, 1.5), slope=between(0.06, 0.12), gravity=st.just(9.81))
+rigs = st.builds(
+    RigParams,
+    wheels,
+    wheels,
+    k=between(0.0, 50.0),
+    b=between(0.0, 150.0),
+    D0=between(0.5, 2.0),
+    S0=between(0.8, 1.5),
+    slope=between(0.06, 0.12),
+    gravity=st.just(9.81),
+)
 """Pairs that keep rolling for a while."""
 
 

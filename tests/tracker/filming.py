@@ -33,8 +33,14 @@ def between(*spans: tuple[float, float]) -> Hidden:
 
 
 def film(
-    truth: Walk, noise_deg: float = 0.05, lost: float = 0.0, front_hidden: Hidden = nothing,
-    rear_hidden: Hidden = nothing, follows: bool = False, hub_noise: float = 0.01, seed: int = 0,
+    truth: Walk,
+    noise_deg: float = 0.05,
+    lost: float = 0.0,
+    front_hidden: Hidden = nothing,
+    rear_hidden: Hidden = nothing,
+    follows: bool = False,
+    hub_noise: float = 0.01,
+    seed: int = 0,
 ) -> list[PairView]:
     """Views of a walk; frames in which no wheel is seen are there, frames that are lost are not."""
     random = np.random.default_rng(seed)
@@ -45,13 +51,15 @@ def film(
     for psi, place, hidden in zip((truth.front, truth.rear), places, (front_hidden, rear_hidden), strict=True):
         seen = psi + math.radians(noise_deg) * random.standard_normal(count)
         x = place + hub_noise * random.standard_normal(count)
-        views.append([
-            None if gone else view(rotation, where)
-            for rotation, where, gone in zip(seen.tolist(), x.tolist(), hidden(truth.time).tolist(), strict=True)])
+        views.append(
+            [
+                None if gone else view(rotation, where)
+                for rotation, where, gone in zip(seen.tolist(), x.tolist(), hidden(truth.time).tolist(), strict=True)
+            ]
+        )
     kept = (random.random(count) >= lost).tolist()
     stamps = (START_NS + np.round(truth.time * 1e9).astype(np.int64)).tolist()
-    return [PairView(stamp, front, rear)
-            for stamp, front, rear, keep in zip(stamps, *views, kept, strict=True) if keep]
+    return [PairView(stamp, front, rear) for stamp, front, rear, keep in zip(stamps, *views, kept, strict=True) if keep]
 
 
 def view(rotation: float, x: float = 0.0, error_px: float = 0.1) -> WheelView:

@@ -25,6 +25,8 @@ from tests import ROOT
 from tests.bags import JOINT_STATE, TYPES, joint_state, write_bag
 from tests.trials import STIFF
 
+pytestmark = pytest.mark.processes
+
 NAMES = ('front_wheel', 'rear_wheel', 'coupler')
 
 
@@ -82,8 +84,9 @@ def test_altered_recording_is_found_out(live_trial, tmp_path):
     changed = bytearray(phases[500])
     changed[-36] ^= 1  # the last digit of the front wheel's speed
     with Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        topics = [writer.add_connection(name, JOINT_STATE, typestore=TYPES)
-                  for name in ('/joint_states', '/phase_state')]
+        topics = [
+            writer.add_connection(name, JOINT_STATE, typestore=TYPES) for name in ('/joint_states', '/phase_state')
+        ]
         for k, (_, log_ns, data) in enumerate(joints):
             writer.write(topics[0], log_ns, data)
             if k < len(phases):
@@ -92,8 +95,10 @@ def test_altered_recording_is_found_out(live_trial, tmp_path):
     assert agreements['phase_state'].recorded - agreements['phase_state'].equal == 1
 
 
-@pytest.mark.parametrize(('storage', 'compression'), [
-    (StoragePlugin.MCAP, CompressionMode.STORAGE), (StoragePlugin.SQLITE3, CompressionMode.MESSAGE)])
+@pytest.mark.parametrize(
+    ('storage', 'compression'),
+    [(StoragePlugin.MCAP, CompressionMode.STORAGE), (StoragePlugin.SQLITE3, CompressionMode.MESSAGE)],
+)
 def test_analysis_of_a_simulated_motion_is_its_truth(motion, tmp_path, storage, compression):
     model, samples = motion
     bag = write_bag(tmp_path / 'bag', messages(samples), '/joint_states', storage, compression)
@@ -102,15 +107,18 @@ def test_analysis_of_a_simulated_motion_is_its_truth(motion, tmp_path, storage, 
     assert trial.motion.theta1 == pytest.approx(samples.theta1, abs=1e-9)
     assert (trial.motion.coupler_force == samples.coupler_force).all()
     assert [fall.wheel for fall in trial.footfalls] == [('front', 'rear')[s.wheel - 1] for s in model.strikes][
-        :len(trial.footfalls)]
+        : len(trial.footfalls)
+    ]
     assert len(trial.footfalls) >= 29
 
 
 def test_joints_of_other_names_are_mapped_by_a_rig_file(motion, tmp_path, capsys):
     bag = write_bag(tmp_path / 'bag', messages(motion[1], ('hub_a', 'hub_b', 'slider')), '/lab/encoders')
     same = write_bag(tmp_path / 'same', messages(motion[1]))
-    (tmp_path / 'rig.yaml').write_text('phase_estimator:\n  ros__parameters:\n    front_joint: hub_a\n'
-                                       '    rear_joint: hub_b\n    coupler_joint: slider\n')
+    (tmp_path / 'rig.yaml').write_text(
+        'phase_estimator:\n  ros__parameters:\n    front_joint: hub_a\n'
+        '    rear_joint: hub_b\n    coupler_joint: slider\n'
+    )
     trial, _ = read_trial(bag, rig=tmp_path / 'rig.yaml', topic='encoders')
     expected, _ = read_trial(same)
     assert all(one.tobytes() == other.tobytes() for one, other in zip(trial.motion, expected.motion, strict=True))
@@ -141,7 +149,11 @@ def test_killed_trial_is_analyzed_up_to_its_last_second(tmp_path):
     (tmp_path / 'rig.yaml').write_text(STIFF)
     process = subprocess.Popen(
         [sys.executable, '-m', 'dcdrw.cli', 'trial', '--rig', 'rig.yaml', '--seconds', '600', '--out', 'out'],
-        cwd=tmp_path, env={**os.environ, 'PYTHONPATH': str(ROOT)}, stdout=subprocess.PIPE, text=True)
+        cwd=tmp_path,
+        env={**os.environ, 'PYTHONPATH': str(ROOT)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
     with process:
         for line in process.stdout:
             if '  2.' in line or '  3.' in line:
@@ -167,7 +179,11 @@ def test_several_recordings_get_a_folder_each(motion, tmp_path, capsys):
     assert main(['analyze', str(one), str(two), '--out', str(tmp_path / 'out')]) == 0
     assert f'{two}: From 35.0 % to within' in capsys.readouterr().out
     assert {path.name for path in (tmp_path / 'out' / 'two').iterdir()} == {
-        'summary.json', 'samples.csv', 'footfalls.csv', 'trial.png'}
+        'summary.json',
+        'samples.csv',
+        'footfalls.csv',
+        'trial.png',
+    }
     assert main(['analyze', str(one), str(two), '--out', str(tmp_path / 'out')]) == 2
     assert 'exists already, not overwriting' in capsys.readouterr().err
     shutil.copytree(one, tmp_path / 'other' / 'one')
@@ -177,9 +193,17 @@ def test_several_recordings_get_a_folder_each(motion, tmp_path, capsys):
 
 def test_analysis_needs_no_ros(motion, tmp_path):
     write_bag(tmp_path / 'bag', messages(motion[1]))
-    code = ('import sys; sys.modules["rclpy"] = sys.modules["builtin_interfaces"] = None; '
-            'from dcdrw.cli import main; sys.exit(main(["analyze", "bag"]))')
-    done = subprocess.run([sys.executable, '-c', code], cwd=tmp_path, env={**os.environ, 'PYTHONPATH': str(ROOT)},
-                          capture_output=True, text=True, check=False)
+    code = (
+        'import sys; sys.modules["rclpy"] = sys.modules["builtin_interfaces"] = None; '
+        'from dcdrw.cli import main; sys.exit(main(["analyze", "bag"]))'
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', code],
+        cwd=tmp_path,
+        env={**os.environ, 'PYTHONPATH': str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith('From 35.0 %')

@@ -30,8 +30,24 @@ def film(tmp_path_factory):
     folder = tmp_path_factory.mktemp('roll')
     (folder / 'made.yaml').write_text(MADE)
     (folder / 'known.yaml').write_text(KNOWN)
-    assert main(['film', '--out', str(folder / 'roll.mp4'), '--rig', str(folder / 'made.yaml'), '--seconds', '5',
-                 '--roll-deg', '1.7', *STANDING, *SMALL]) == 0
+    assert (
+        main(
+            [
+                'film',
+                '--out',
+                str(folder / 'roll.mp4'),
+                '--rig',
+                str(folder / 'made.yaml'),
+                '--seconds',
+                '5',
+                '--roll-deg',
+                '1.7',
+                *STANDING,
+                *SMALL,
+            ]
+        )
+        == 0
+    )
     return folder / 'roll.mp4'
 
 
@@ -40,14 +56,28 @@ def followed(tmp_path_factory):
     """A roll that the camera follows."""
     folder = tmp_path_factory.mktemp('followed')
     (folder / 'known.yaml').write_text(KNOWN)
-    assert main(['film', '--out', str(folder / 'f.mp4'), '--rig', str(folder / 'known.yaml'), '--seconds', '3',
-                 *SMALL]) == 0
+    assert (
+        main(['film', '--out', str(folder / 'f.mp4'), '--rig', str(folder / 'known.yaml'), '--seconds', '3', *SMALL])
+        == 0
+    )
     return folder / 'f.mp4'
 
 
 def calibrate(film, out, *more, rig='known.yaml'):
-    return main(['calibrate', str(film), '--camera', str(film.with_suffix('.camera.yaml')), '--rig',
-                 str(film.parent / rig), '--out', str(out), '--quiet', *more])
+    return main(
+        [
+            'calibrate',
+            str(film),
+            '--camera',
+            str(film.with_suffix('.camera.yaml')),
+            '--rig',
+            str(film.parent / rig),
+            '--out',
+            str(out),
+            '--quiet',
+            *more,
+        ]
+    )
 
 
 def check(params, roll_deg=1.7):
@@ -90,13 +120,19 @@ def test_with_a_level_camera_the_slope_is_learned(film, tmp_path):
     assert math.degrees(params.track.slope) == pytest.approx(2.0, abs=0.1)
 
 
-@pytest.mark.parametrize(('arguments', 'message'), [
-    ([], 'the camera must stand still, not follow the pair'),
-    (['--to', '1.5'], ' steps before the camera, but 4 are needed: film a longer way'),
-    (['--out', 'there.yaml'], 'there.yaml exists already, not overwriting'),
-    (['--camera', 'no.yaml'], 'no.yaml'),
-    (['--rig', 'other.yaml', '--to', '0.5'], 'no tag was seen; looked for 17 (front) and 18 (rear) of family 36h11'),
-])
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        ([], 'the camera must stand still, not follow the pair'),
+        (['--to', '1.5'], ' steps before the camera, but 4 are needed: film a longer way'),
+        (['--out', 'there.yaml'], 'there.yaml exists already, not overwriting'),
+        (['--camera', 'no.yaml'], 'no.yaml'),
+        (
+            ['--rig', 'other.yaml', '--to', '0.5'],
+            'no tag was seen; looked for 17 (front) and 18 (rear) of family 36h11',
+        ),
+    ],
+)
 def test_what_tells_nothing_is_refused_in_one_line(followed, tmp_path, monkeypatch, capsys, arguments, message):
     monkeypatch.chdir(tmp_path)
     Path('there.yaml').write_text('')

@@ -38,14 +38,17 @@ def test_best_pair_of_parts_with_card_and_numbers(tmp_path, parts, capsys):
     assert (tmp_path / 'out' / 'card.png').read_bytes().startswith(b'\x89PNG')
 
 
-@pytest.mark.parametrize(('content', 'message'), [
-    ('', 'header'),
-    ('kind,value\nspring,5\n', 'no dashpot'),
-    ('kind,value\nrope,5\n', 'line 2: kind must be spring or dashpot'),
-    ('kind,value\nspring,stiff\n', "line 2: value must be a number, got 'stiff'"),
-    ('kind,value\nspring,-1\n', 'line 2: value must be > 0'),
-    ('kind,value\nspring\n', 'line 2: value must be a number'),
-])
+@pytest.mark.parametrize(
+    ('content', 'message'),
+    [
+        ('', 'header'),
+        ('kind,value\nspring,5\n', 'no dashpot'),
+        ('kind,value\nrope,5\n', 'line 2: kind must be spring or dashpot'),
+        ('kind,value\nspring,stiff\n', "line 2: value must be a number, got 'stiff'"),
+        ('kind,value\nspring,-1\n', 'line 2: value must be > 0'),
+        ('kind,value\nspring\n', 'line 2: value must be a number'),
+    ],
+)
 def test_wrong_parts_are_named(tmp_path, content, message):
     path = tmp_path / 'parts.csv'
     path.write_text(content)
@@ -53,15 +56,18 @@ def test_wrong_parts_are_named(tmp_path, content, message):
         read_parts(path)
 
 
-@pytest.mark.parametrize(('arguments', 'message'), [
-    (['--k', '5'], '--k and --b together'),
-    (['--slope-deg', '1'], 'too gentle'),
-    (['--spokes', '3'], 'spokes'),
-    (['--tolerance', '100'], 'below 100 %'),
-    (['--band', '50'], 'below 50 %'),
-    (['--k-min', '5', '--k-max', '4'], '--k-min 5 is above --k-max 4'),
-    (['--available', 'nowhere.csv'], 'nowhere.csv'),
-])
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        (['--k', '5'], '--k and --b together'),
+        (['--slope-deg', '1'], 'too gentle'),
+        (['--spokes', '3'], 'spokes'),
+        (['--tolerance', '100'], 'below 100 %'),
+        (['--band', '50'], 'below 50 %'),
+        (['--k-min', '5', '--k-max', '4'], '--k-min 5 is above --k-max 4'),
+        (['--available', 'nowhere.csv'], 'nowhere.csv'),
+    ],
+)
 def test_wrong_input_is_told_in_one_line(capsys, arguments, message):
     assert main(['design', *arguments]) == 2
     errors = capsys.readouterr().err

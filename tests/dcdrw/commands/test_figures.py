@@ -56,6 +56,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path, monkeypatch, capsys
         if len(computed) == 3:
             raise KeyboardInterrupt
         return compute(sweep, block)
+
     monkeypatch.setattr('dcdrw_sim.study.sweep_run.compute', interrupted)
     monkeypatch.setattr('os.sched_getaffinity', lambda process: {0})
     assert draw(tmp_path, '--only', 'trajectories') == 130
@@ -88,9 +89,13 @@ def test_cache_is_where_the_desktop_keeps_caches(monkeypatch, tmp_path):
     assert figures._default_cache() == tmp_path / 'home' / '.cache' / 'dcdrw'
 
 
-@pytest.mark.parametrize(('module', 'message'), [
-    ('matplotlib.figure', 'a figure needs matplotlib: pip install matplotlib'),
-    ('xarray', "a sweep needs xarray: pip install 'dcdrw[sweep]'")])
+@pytest.mark.parametrize(
+    ('module', 'message'),
+    [
+        ('matplotlib.figure', 'a figure needs matplotlib: pip install matplotlib'),
+        ('xarray', "a sweep needs xarray: pip install 'dcdrw[sweep]'"),
+    ],
+)
 def test_a_missing_library_is_told(tmp_path, monkeypatch, capsys, module, message):
     monkeypatch.setitem(sys.modules, module, None)
     assert draw(tmp_path) == 2

@@ -25,6 +25,8 @@ from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatorParams
 from tests import ROOT
 
+pytestmark = pytest.mark.processes
+
 cv2 = pytest.importorskip('cv2')
 
 SMALL = ['--image-width', '320', '--image-height', '180', '--fps', '30']
@@ -47,9 +49,32 @@ def film(tmp_path_factory):
     folder = tmp_path_factory.mktemp('film')
     (folder / 'rig.yaml').write_text(
         '/**:\n  ros__parameters:\n    front: {length: 1.0, spokes: 10}\n    rear: {length: 0.9}\n    slope: 0.05\n'
-        '    size: 0.2\n    front.ids: [7]\n')
-    assert main(['film', '--out', str(folder / 'a.mkv'), '--rig', str(folder / 'rig.yaml'), '--seconds', '3',
-                 '--initial-phase', '30', '--grey', '--noise', '0', '--pan-deg', '20', '--k1', '-0.1', *SMALL]) == 0
+        '    size: 0.2\n    front.ids: [7]\n'
+    )
+    assert (
+        main(
+            [
+                'film',
+                '--out',
+                str(folder / 'a.mkv'),
+                '--rig',
+                str(folder / 'rig.yaml'),
+                '--seconds',
+                '3',
+                '--initial-phase',
+                '30',
+                '--grey',
+                '--noise',
+                '0',
+                '--pan-deg',
+                '20',
+                '--k1',
+                '-0.1',
+                *SMALL,
+            ]
+        )
+        == 0
+    )
     return folder / 'a.mkv'
 
 
@@ -63,12 +88,18 @@ def test_truth_is_what_the_simulation_does(film):
     truth = rows(film.with_suffix('.csv'))
     assert [int(row['stamp_ns']) for row in truth] == [round(k * 1e9 / 30) for k in range(90)]
     motion = result.at([k / 30 for k in range(90)])
-    for name, column in (('psi1', motion.rotation1), ('psi2', motion.rotation2), ('omega1', motion.omega1),
-                         ('omega2', motion.omega2), ('n', motion.steps1 - motion.steps2)):
+    for name, column in (
+        ('psi1', motion.rotation1),
+        ('psi2', motion.rotation2),
+        ('omega1', motion.omega1),
+        ('omega2', motion.omega2),
+        ('n', motion.steps1 - motion.steps2),
+    ):
         assert [float(row[name]) for row in truth] == pytest.approx(list(column), abs=1e-9)
     phase = motion.rotation1 / (2 * rig.front.alpha) - motion.rotation2 / (2 * rig.rear.alpha)
     assert [float(row['phi']) for row in truth] == pytest.approx(
-        list(phase % 1.0 * (rig.front.alpha + rig.rear.alpha)), abs=1e-9)
+        list(phase % 1.0 * (rig.front.alpha + rig.rear.alpha)), abs=1e-9
+    )
 
 
 def test_strikes_are_those_of_the_simulation_with_their_feet(film):
@@ -77,25 +108,31 @@ def test_strikes_are_those_of_the_simulation_with_their_feet(film):
     strikes = rows(film.with_suffix('.strikes.csv'))
     assert len(strikes) >= 8
     assert [(row['wheel'], int(row['stamp_ns'])) for row in strikes] == [
-        (('front', 'rear')[strike.wheel - 1], round(strike.t * 1e9)) for strike in expected]
+        (('front', 'rear')[strike.wheel - 1], round(strike.t * 1e9)) for strike in expected
+    ]
     for wheel, start, shape in (('front', rig.S0, rig.front), ('rear', 0.0, rig.rear)):
         mine = [row for row in strikes if row['wheel'] == wheel]
         assert [int(row['steps']) for row in mine] == list(range(1, len(mine) + 1))
         assert [float(row['x']) for row in mine] == pytest.approx(
-            [start + (k + 1) * shape.step_length for k in range(len(mine))])
+            [start + (k + 1) * shape.step_length for k in range(len(mine))]
+        )
 
 
 def test_each_frame_shows_its_row(film):
     params, camera = rig_of(film), read_camera(film.with_suffix('.camera.yaml'))
     rig = params.rig
     assert (params.tags.size, params.tags.front.ids) == (0.2, (7,))
-    scene = SceneParams(*(SceneParams().front._replace(length=wheel.length, spokes=wheel.spokes)
-                          for wheel in (rig.front, rig.rear)), slope=rig.slope)
+    scene = SceneParams(
+        *(SceneParams().front._replace(length=wheel.length, spokes=wheel.spokes) for wheel in (rig.front, rig.rear)),
+        slope=rig.slope,
+    )
     renderer = Renderer(scene, ViewParams(pan_deg=20.0), LookParams(noise=0.0), params.tags, camera, colour=False)
     images, truth = frames(film), rows(film.with_suffix('.csv'))
     assert len(images) == len(truth) == 90
-    joints = [JointSample(int(row['stamp_ns']), *(Turn(float(row[f'psi{i}']), float(row[f'omega{i}'])) for i in (1, 2)))
-              for row in truth]
+    joints = [
+        JointSample(int(row['stamp_ns']), *(Turn(float(row[f'psi{i}']), float(row[f'omega{i}'])) for i in (1, 2)))
+        for row in truth
+    ]
     footing = Footing(scene, joints[0])
     for k in (0, 1, 45, 89):
         difference = np.abs(images[k][..., 0].astype(int) - renderer.draw(footing, joints[k]))
@@ -116,9 +153,13 @@ def test_dropped_frames_leave_gaps_in_the_stamps(tmp_path, capsys):
 
 def test_interrupting_keeps_a_valid_film(tmp_path):
     with subprocess.Popen(
-            [sys.executable, '-m', 'dcdrw.cli', 'film', '--out', 'c.mp4', '--seconds', '3000', *SMALL], cwd=tmp_path,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-            env={**os.environ, 'PYTHONPATH': f'{ROOT}:{os.environ.get("PYTHONPATH", "")}'}) as process:
+        [sys.executable, '-m', 'dcdrw.cli', 'film', '--out', 'c.mp4', '--seconds', '3000', *SMALL],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, 'PYTHONPATH': f'{ROOT}:{os.environ.get("PYTHONPATH", "")}'},
+    ) as process:
         end = time.monotonic() + 60.0
         while not (tmp_path / 'c.mp4').exists() or (tmp_path / 'c.mp4').stat().st_size < 100_000:
             assert process.poll() is None
@@ -136,26 +177,32 @@ def test_interrupting_keeps_a_valid_film(tmp_path):
 def test_a_motion_that_cannot_go_on_ends_the_film_and_says_why(tmp_path, capsys):
     # On one foothold, the rear wheel the faster: its hub meets the other's.
     (tmp_path / 'rig.yaml').write_text(
-        '/**:\n  ros__parameters: {S0: 0.0, k: 0.0, b: 0.0, theta1: 0.0, omega1: 1.0, theta2: -0.1, omega2: 2.0}\n')
-    assert main(['film', '--out', str(tmp_path / 'd.mp4'), '--rig', str(tmp_path / 'rig.yaml'), '--seconds', '4',
-                 *SMALL]) == 1
+        '/**:\n  ros__parameters: {S0: 0.0, k: 0.0, b: 0.0, theta1: 0.0, omega1: 1.0, theta2: -0.1, omega2: 2.0}\n'
+    )
+    assert (
+        main(['film', '--out', str(tmp_path / 'd.mp4'), '--rig', str(tmp_path / 'rig.yaml'), '--seconds', '4', *SMALL])
+        == 1
+    )
     assert '; ended at 0.' in (said := capsys.readouterr().out)
     assert 'the hubs met' in said
     assert 0 < len(frames(tmp_path / 'd.mp4')) == len(rows(tmp_path / 'd.csv')) < 120
 
 
-@pytest.mark.parametrize(('arguments', 'message'), [
-    (['--out', 'there.mp4'], 'there.mp4 exists already, not overwriting'),
-    (['--out', 'beside.mp4'], 'beside.csv exists already, not overwriting'),
-    (['--out', 'film.gif'], '--out must end in .mp4, .avi, .mkv, got film.gif'),
-    (['--out', 'no/such/film.mp4'], 'no/such is no folder'),
-    (['--out', 'film.mp4', '--drop', '100'], '--drop must be ≥ 0 and < 100 %'),
-    (['--out', 'film.mp4', '--distance', '0'], 'distance must be > 0 m, got 0.0'),
-    (['--out', 'film.mp4', '--occlude', 'all'], 'occlude must be front, rear, both or empty'),
-    (['--out', 'film.mp4', '--camera', 'lens.yaml'], 'lens.yaml'),
-    (['--out', 'film.mp4', '--rig', 'rig.yaml'], 'rear.ids: tag 0 is mounted twice'),
-    (['--out', 'film.mp4', '--initial-phase', '120'], 'initial_phase_percent must be'),
-])
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        (['--out', 'there.mp4'], 'there.mp4 exists already, not overwriting'),
+        (['--out', 'beside.mp4'], 'beside.csv exists already, not overwriting'),
+        (['--out', 'film.gif'], '--out must end in .mp4, .avi, .mkv, got film.gif'),
+        (['--out', 'no/such/film.mp4'], 'no/such is no folder'),
+        (['--out', 'film.mp4', '--drop', '100'], '--drop must be ≥ 0 and < 100 %'),
+        (['--out', 'film.mp4', '--distance', '0'], 'distance must be > 0 m, got 0.0'),
+        (['--out', 'film.mp4', '--occlude', 'all'], 'occlude must be front, rear, both or empty'),
+        (['--out', 'film.mp4', '--camera', 'lens.yaml'], 'lens.yaml'),
+        (['--out', 'film.mp4', '--rig', 'rig.yaml'], 'rear.ids: tag 0 is mounted twice'),
+        (['--out', 'film.mp4', '--initial-phase', '120'], 'initial_phase_percent must be'),
+    ],
+)
 def test_wrong_input_is_told_in_one_line_and_leaves_nothing(tmp_path, monkeypatch, capsys, arguments, message):
     monkeypatch.chdir(tmp_path)
     for name in ('there.mp4', 'beside.csv'):

@@ -59,8 +59,7 @@ def test_where_no_wheel_rolls_by_itself_there_is_no_start(tmp_path, capsys):
 
 def test_unequal_wheels_are_refused(tmp_path, capsys):
     assert main(['regimes', '--rig', written(tmp_path, 'rear.mass: 8.0')]) == 2
-    assert capsys.readouterr().err == (
-        'dcdrw regimes: regimes are those of equal wheels: make front and rear alike\n')
+    assert capsys.readouterr().err == ('dcdrw regimes: regimes are those of equal wheels: make front and rear alike\n')
 
 
 def test_help_reads_well(capsys):

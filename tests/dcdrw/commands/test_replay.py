@@ -17,11 +17,16 @@ from dcdrw_msgs_py.topics import CLOCK, FOOTFALLS, JOINT_STATES, PHASE_STATE
 from tests import ROOT
 from tests.bags import joint_state, write_bag
 
+pytestmark = pytest.mark.processes
+
 
 def replay(bench, *arguments: str) -> subprocess.Popen[str]:
     process = subprocess.Popen(
-        [sys.executable, '-m', 'dcdrw.cli', 'replay', *arguments], text=True,
-        env={**os.environ, 'PYTHONPATH': str(ROOT), 'ROS_DOMAIN_ID': str(bench.domain)}, stdout=subprocess.PIPE)
+        [sys.executable, '-m', 'dcdrw.cli', 'replay', *arguments],
+        text=True,
+        env={**os.environ, 'PYTHONPATH': str(ROOT), 'ROS_DOMAIN_ID': str(bench.domain)},
+        stdout=subprocess.PIPE,
+    )
     bench.processes.append(process)
     return process
 
@@ -47,8 +52,13 @@ def test_estimator_says_again_what_it_said_live(bench, live_trial):
     assert process.returncode == 0
     batches = recorded(live_trial, '/phase_state')
     names = batches[0].names
-    live = {stamp: (*position, *velocity[:3]) for batch in batches for stamp, position, velocity in zip(
-        batch.stamp_ns.tolist(), batch.position.tolist(), batch.velocity.tolist(), strict=True)}
+    live = {
+        stamp: (*position, *velocity[:3])
+        for batch in batches
+        for stamp, position, velocity in zip(
+            batch.stamp_ns.tolist(), batch.position.tolist(), batch.velocity.tolist(), strict=True
+        )
+    }
     assert len(phases) > 900
     for message in phases:
         stamp = stamp_ns(message.header.stamp)
@@ -66,9 +76,14 @@ def test_estimator_says_again_what_it_said_live(bench, live_trial):
 @pytest.fixture
 def renamed(tmp_path):
     """Ten seconds at 100 Hz, by other names and from another namespace."""
-    return write_bag(tmp_path / 'bag', [
-        (10**18 + k * 10**7, joint_state(5 * 10**9 + k * 10**7, ['hub_a', 'arm', 'hub_b'], [k, 0.5, -k]))
-        for k in range(1000)], '/lab/joint_states')
+    return write_bag(
+        tmp_path / 'bag',
+        [
+            (10**18 + k * 10**7, joint_state(5 * 10**9 + k * 10**7, ['hub_a', 'arm', 'hub_b'], [k, 0.5, -k]))
+            for k in range(1000)
+        ],
+        '/lab/joint_states',
+    )
 
 
 def test_part_of_a_recording_is_replayed_by_its_own_names(bench, renamed):
@@ -83,9 +98,13 @@ def test_part_of_a_recording_is_replayed_by_its_own_names(bench, renamed):
 def test_pace_is_that_of_the_stamps_whatever_the_recorder_saw(bench, tmp_path):
     """A trial that was simulated ten times as fast as real takes its own time, and does not wait where stamps jump."""
     jump = 10**12
-    bag = write_bag(tmp_path / 'bag', [
-        (10**18 + k * 10**6, joint_state(k * 10**7 + (jump if k >= 100 else 0), ['front_wheel'], [k]))
-        for k in range(200)])
+    bag = write_bag(
+        tmp_path / 'bag',
+        [
+            (10**18 + k * 10**6, joint_state(k * 10**7 + (jump if k >= 100 else 0), ['front_wheel'], [k]))
+            for k in range(200)
+        ],
+    )
     joints, clocks = bench.hear(JOINT_STATES), bench.hear(CLOCK)
     process = replay(bench, str(bag))
     bench.wait(lambda: joints, 'a joint state')
@@ -96,11 +115,13 @@ def test_pace_is_that_of_the_stamps_whatever_the_recorder_saw(bench, tmp_path):
 
 
 def test_rig_file_gives_the_joints_the_names_of_the_suite(bench, renamed, tmp_path):
-    (tmp_path / 'rig.yaml').write_text('phase_estimator:\n  ros__parameters:\n    front_joint: hub_a\n'
-                                       '    rear_joint: hub_b\n')
+    (tmp_path / 'rig.yaml').write_text(
+        'phase_estimator:\n  ros__parameters:\n    front_joint: hub_a\n    rear_joint: hub_b\n'
+    )
     joints = bench.hear(JOINT_STATES, '/rig_2/joint_states')
-    process = replay(bench, str(renamed), '--rig', str(tmp_path / 'rig.yaml'), '--namespace', 'rig_2', '--to', '1',
-                     '--rate', '4')
+    process = replay(
+        bench, str(renamed), '--rig', str(tmp_path / 'rig.yaml'), '--namespace', 'rig_2', '--to', '1', '--rate', '4'
+    )
     assert finish(bench, process) == '100 joint states sent\n'
     assert joints[99].name == ['front_wheel', 'arm', 'rear_wheel']
     assert joints[99].position.tolist() == [99.0, 0.5, -99.0]
@@ -116,12 +137,19 @@ def test_loop_goes_on_until_it_is_interrupted(bench, renamed):
     assert [message.position[0] for message in joints[:120]] == [*range(50), *range(50), *range(20)]
 
 
-@pytest.mark.parametrize(('arguments', 'message'), [
-    (['nowhere'], 'nowhere does not exist'),
-    (['bag', '--from', '30'], '--from 30 must lie before --to and within the recording (10.0 s)'),
-    (['bag', '--from', '3', '--to', '2'], '--from 3 must lie before --to'),
-    (['bag', '--topic', 'wheels'], 'no topic wheels of sensor_msgs/msg/JointState; of this type it has: /lab/joint'),
-    (['bag', '--rig', 'nowhere.yaml'], 'nowhere.yaml')])
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        (['nowhere'], 'nowhere does not exist'),
+        (['bag', '--from', '30'], '--from 30 must lie before --to and within the recording (10.0 s)'),
+        (['bag', '--from', '3', '--to', '2'], '--from 3 must lie before --to'),
+        (
+            ['bag', '--topic', 'wheels'],
+            'no topic wheels of sensor_msgs/msg/JointState; of this type it has: /lab/joint',
+        ),
+        (['bag', '--rig', 'nowhere.yaml'], 'nowhere.yaml'),
+    ],
+)
 def test_wrong_input_is_told_in_one_line(renamed, monkeypatch, capsys, arguments, message):
     monkeypatch.chdir(renamed.parent)
     assert main(['replay', *arguments]) == 2

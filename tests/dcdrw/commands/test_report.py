@@ -13,6 +13,8 @@ from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatorParams
 from tests.bags import joint_state, write_bag
 
+pytestmark = pytest.mark.processes
+
 RATE = 100
 SECONDS = 12.0
 
@@ -24,10 +26,15 @@ def measured_bag(folder, phase, names=('front_wheel', 'rear_wheel')):
     times = np.arange(0.0, SECONDS, 1.0 / RATE)
     trajectory = motion.at(times)
     stamps = 10**18 + (times * 1e9).astype(int)
-    return write_bag(folder, [
-        (int(stamp), joint_state(int(stamp), names, (psi1, psi2), (omega1, omega2)))
-        for stamp, psi1, psi2, omega1, omega2 in zip(
-            stamps, trajectory.rotation1, trajectory.rotation2, trajectory.omega1, trajectory.omega2, strict=True)])
+    return write_bag(
+        folder,
+        [
+            (int(stamp), joint_state(int(stamp), names, (psi1, psi2), (omega1, omega2)))
+            for stamp, psi1, psi2, omega1, omega2 in zip(
+                stamps, trajectory.rotation1, trajectory.rotation2, trajectory.omega1, trajectory.omega2, strict=True
+            )
+        ],
+    )
 
 
 class Page(HTMLParser):
@@ -73,7 +80,9 @@ def test_page_is_self_contained_and_tells_each_trial(report):
 def test_tables_hold_every_number(report):
     trials = rows(report, 'trials.csv')
     assert [(trial['source'], float(trial['initial_phase_percent'])) for trial in trials] == [
-        ('simulated', pytest.approx(35.0)), ('measured', pytest.approx(30.0))]
+        ('simulated', pytest.approx(35.0)),
+        ('measured', pytest.approx(30.0)),
+    ]
     live, bag = trials
     assert live['synchronized'] == 'True'
     assert float(live['k']) == 60.0

@@ -47,12 +47,15 @@ def test_rig_file_changes_the_preset(tmp_path, capsys):
     assert json.loads(out.read_text(encoding='utf-8'))['parameters']['k'] == 40.0
 
 
-@pytest.mark.parametrize(('content', 'message'), [
-    ('rear.spokes: 13', 'a return map needs wheels of equal step length'),
-    ('slope: 0.01', 'too gentle for the front wheel'),
-    ('b: -1', 'b must be'),
-    ('b: 32\n    slope: 0.0305', 'no fixed point'),
-])
+@pytest.mark.parametrize(
+    ('content', 'message'),
+    [
+        ('rear.spokes: 13', 'a return map needs wheels of equal step length'),
+        ('slope: 0.01', 'too gentle for the front wheel'),
+        ('b: -1', 'b must be'),
+        ('b: 32\n    slope: 0.0305', 'no fixed point'),
+    ],
+)
 def test_a_rig_without_map_is_told_in_one_line(tmp_path, monkeypatch, capsys, content, message):
     monkeypatch.chdir(tmp_path)
     Path('rig.yaml').write_text(FORM.format(content))

@@ -56,7 +56,8 @@ def test_trajectory_passes_through_the_strikes(tmp_path):
     times = np.array([float(row['time']) for row in first])
     strike = reference()[0]['strikes'][1]  # of the front wheel
     assert np.interp(strike['t'], times, [float(row['theta2']) for row in first]) == pytest.approx(
-        strike['state'][2], abs=1e-5)
+        strike['state'][2], abs=1e-5
+    )
     assert first[0]['rotation1'] == first[0]['theta1']
 
 
@@ -79,15 +80,18 @@ def test_cases_of_one_name_are_told_apart(tmp_path):
         assert {'case_0/theta1', 'case_1/theta1'} <= set(columns.files)
 
 
-@pytest.mark.parametrize(('arguments', 'message'), [
-    (['case.json', '--trajectory', 'motion.csv', '--rate', '1e12'], 'samples; 2e+07 are the limit'),
-    (['nowhere.json'], 'nowhere.json'),
-    (['broken.json'], 'broken.json is not JSON'),
-    (['empty.json'], 'empty.json'),
-    (['keyless.json'], 'k is missing'),
-    (['case.json', '--trajectory', 'motion.txt'], '--trajectory must end in .csv or .npz, got motion.txt'),
-    (['case.json', '--strikes', 'no/such/folder.json'], 'no/such/folder.json'),
-])
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        (['case.json', '--trajectory', 'motion.csv', '--rate', '1e12'], 'samples; 2e+07 are the limit'),
+        (['nowhere.json'], 'nowhere.json'),
+        (['broken.json'], 'broken.json is not JSON'),
+        (['empty.json'], 'empty.json'),
+        (['keyless.json'], 'k is missing'),
+        (['case.json', '--trajectory', 'motion.txt'], '--trajectory must end in .csv or .npz, got motion.txt'),
+        (['case.json', '--strikes', 'no/such/folder.json'], 'no/such/folder.json'),
+    ],
+)
 def test_wrong_input_is_told_in_one_line(tmp_path, monkeypatch, capsys, arguments, message):
     monkeypatch.chdir(tmp_path)
     case = reference()[0]['case']
@@ -102,8 +106,10 @@ def test_wrong_input_is_told_in_one_line(tmp_path, monkeypatch, capsys, argument
 
 
 def test_help_reads_well(capsys):
-    commands = ('trial live record replay analyze report film tags track calibrate design sweep figures regimes map '
-                'models simulate urdf')
+    commands = (
+        'trial live record replay analyze report film tags track calibrate design sweep figures regimes map '
+        'models simulate urdf'
+    )
     for command in ('', *commands.split()):
         with pytest.raises(SystemExit) as ended:
             main([*filter(None, [command]), '--help'])

@@ -14,6 +14,8 @@ from dcdrw.cli import main
 from dcdrw_sim.study.sweep_dataset import open_sweep, sweep_of
 from tests import ROOT
 
+pytestmark = pytest.mark.processes
+
 PATIENCE = 120.0
 QUICK = ['--x', 'k:1e-3:1e-2:2:log', '--y', 'b:0.1:1:3', '--seconds', '30', '--starts', '2']
 LONG = ['--x', 'k:1e-3:1e-2:24:log', '--y', 'b:0.1:0.3:4', '--seconds', '20000', '--starts', '1', '--no-trajectories']
@@ -49,16 +51,24 @@ def long_sweep(tmp_path_factory):
 def start():
     """Start processes that end with the test."""
     with ExitStack() as stack:
+
         def start_process(*arguments, **options):
-            process = subprocess.Popen([sys.executable, '-m', *arguments], start_new_session=True, text=True,
-                                       env={**os.environ, 'PYTHONPATH': str(ROOT)}, **options)
+            process = subprocess.Popen(
+                [sys.executable, '-m', *arguments],
+                start_new_session=True,
+                text=True,
+                env={**os.environ, 'PYTHONPATH': str(ROOT)},
+                **options,
+            )
             stack.callback(process.wait)
             stack.callback(process.kill)
             return process
+
         yield start_process
 
 
 # What is told
+
 
 def test_a_sweep_tells_what_became_of_the_points(tmp_path, capsys):
     path = tmp_path / 'new' / 'sweep.nc'
@@ -79,20 +89,41 @@ def test_a_rig_brings_its_units(tmp_path):
     rig = tmp_path / 'rig.yaml'
     rig.write_text('/**:\n  ros__parameters:\n    front.mass: 8.0\n')
     path = tmp_path / 'sweep.nc'
-    assert main(['sweep', '--out', str(path), '--preset', 'paper', '--rig', str(rig), '--y', 'slope_deg:2:3:2',
-                 '--starts', '1', '--seconds', '5']) == 0
+    assert (
+        main(
+            [
+                'sweep',
+                '--out',
+                str(path),
+                '--preset',
+                'paper',
+                '--rig',
+                str(rig),
+                '--y',
+                'slope_deg:2:3:2',
+                '--starts',
+                '1',
+                '--seconds',
+                '5',
+            ]
+        )
+        == 0
+    )
     with open_sweep(path) as dataset:
         assert sweep_of(dataset).rig.front.mass == 8.0
         assert dataset.k.values[0] == pytest.approx(1e-4 * 8.0 * 9.81 / 0.9652)
         assert dataset.slope_deg.attrs['units'] == '°'
 
 
-@pytest.mark.parametrize(('options', 'message'), [
-    (['--y', 'slope_deg:0.5:3:4'], 'too gentle for the front wheel'),
-    (['--x', 'b:1:2:3'], 'both axes set b'),
-    (['--x', 'k:-1:1:3'], 'k must be ≥ 0'),
-    (['--scheduler', 'tcp://127.0.0.1:1'], 'no Dask scheduler answers at tcp://127.0.0.1:1'),
-])
+@pytest.mark.parametrize(
+    ('options', 'message'),
+    [
+        (['--y', 'slope_deg:0.5:3:4'], 'too gentle for the front wheel'),
+        (['--x', 'b:1:2:3'], 'both axes set b'),
+        (['--x', 'k:-1:1:3'], 'k must be ≥ 0'),
+        (['--scheduler', 'tcp://127.0.0.1:1'], 'no Dask scheduler answers at tcp://127.0.0.1:1'),
+    ],
+)
 def test_what_cannot_be_is_told_in_one_line(tmp_path, monkeypatch, capsys, options, message):
     monkeypatch.setattr('dcdrw.commands.sweep.CONNECT_SECONDS', 0.5)
     assert main(['sweep', '--out', str(tmp_path / 'sweep.nc'), *options]) == 2
@@ -126,6 +157,7 @@ def test_help_reads_well(capsys):
 
 # Interruptions
 
+
 @pytest.mark.parametrize(('number', 'status'), [(signal.SIGKILL, -signal.SIGKILL), (signal.SIGINT, 130)])
 def test_a_sweep_that_is_ended_goes_on_where_it_was(tmp_path, start, long_sweep, number, status):
     for attempt in range(5):  # it might be done before the signal comes
@@ -145,6 +177,7 @@ def test_a_sweep_that_is_ended_goes_on_where_it_was(tmp_path, start, long_sweep,
 
 # A cluster
 
+
 def test_a_cluster_makes_the_same_though_a_worker_is_killed(tmp_path, start, long_sweep):
     pytest.importorskip('distributed')
     with socket.socket() as free:
@@ -153,9 +186,14 @@ def test_a_cluster_makes_the_same_though_a_worker_is_killed(tmp_path, start, lon
     log = open(tmp_path / 'cluster.log', 'w')  # noqa: SIM115
     quiet = {'cwd': tmp_path, 'stdout': log, 'stderr': log}
     start('dask', 'scheduler', '--host', '127.0.0.1', '--port', address.rpartition(':')[2], '--no-dashboard', **quiet)
-    workers = [start('dask', 'worker', address, '--host', '127.0.0.1', '--nthreads', '1', '--no-dashboard',
-                     '--no-nanny', **quiet) for _ in range(2)]
+    workers = [
+        start(
+            'dask', 'worker', address, '--host', '127.0.0.1', '--nthreads', '1', '--no-dashboard', '--no-nanny', **quiet
+        )
+        for _ in range(2)
+    ]
     from distributed import Client
+
     with Client(address, timeout=PATIENCE, set_as_default=False) as client:
         client.wait_for_workers(2, timeout=PATIENCE)
         path = tmp_path / 'sweep.nc'

@@ -14,16 +14,22 @@ from dcdrw.commands.tag_sheet import PAPERS, draw_pages
 from dcdrw_msgs_py.opencv import tag_dictionary
 from dcdrw_msgs_py.tagging import TagGroup, TagParams
 
+pytestmark = pytest.mark.processes
+
 cv2 = pytest.importorskip('cv2')
 pytest.importorskip('matplotlib')
 POINTS = 72.0 / 25.4
 DPI = 100
-SEVERAL = TagParams(size=0.05, front=TagGroup((3, 8, 21), (0.0, 90.0, 0.0), (0.0, 0.1, 0.2), (0.0, 0.0, 0.1)),
-                    rear=TagGroup((5, 6), (45.0, 0.0), (0.0, 0.0), (0.0, 0.1)))
+SEVERAL = TagParams(
+    size=0.05,
+    front=TagGroup((3, 8, 21), (0.0, 90.0, 0.0), (0.0, 0.1, 0.2), (0.0, 0.0, 0.1)),
+    rear=TagGroup((5, 6), (45.0, 0.0), (0.0, 0.0), (0.0, 0.1)),
+)
 
 
 def grey(page) -> np.ndarray:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
+
     canvas = FigureCanvasAgg(page)
     page.set_dpi(DPI)
     canvas.draw()
@@ -33,8 +39,11 @@ def grey(page) -> np.ndarray:
 def detect(image: np.ndarray) -> dict[int, np.ndarray]:
     """Corners by id, from the tag's upper left one; ArUco's upright is half a turn from AprilTag's."""
     dictionary = tag_dictionary('36h11')
-    found, ids = (cv2.aruco.ArucoDetector(dictionary).detectMarkers(image)[:2] if hasattr(cv2.aruco, 'ArucoDetector')
-                  else cv2.aruco.detectMarkers(image, dictionary)[:2])
+    found, ids = (
+        cv2.aruco.ArucoDetector(dictionary).detectMarkers(image)[:2]
+        if hasattr(cv2.aruco, 'ArucoDetector')
+        else cv2.aruco.detectMarkers(image, dictionary)[:2]
+    )
     return {int(tag): np.roll(corner[0], 2, axis=0) for tag, corner in zip(np.ravel(ids), found, strict=True)}
 
 
@@ -68,8 +77,13 @@ def test_pdf_is_true_to_scale(tmp_path, paper):
         assert any(size == pytest.approx((160.0, 160.0), abs=0.01) for size in sizes), 'the black square'
         assert any(size == pytest.approx((100.0, 0.0), abs=0.01) for size in sizes), 'the ruler'
         assert any(size == pytest.approx((200.0, 211.0), abs=0.01) for size in sizes), 'the cut line'
-        everything = np.concatenate([points for points, size in zip(paths, sizes, strict=True)
-                                     if size != pytest.approx(PAPERS[paper], abs=0.01)])  # the paper itself
+        everything = np.concatenate(
+            [
+                points
+                for points, size in zip(paths, sizes, strict=True)
+                if size != pytest.approx(PAPERS[paper], abs=0.01)
+            ]
+        )  # the paper itself
         assert everything.min() >= 5.0 - 1e-3
         assert np.all(everything.max(axis=0) <= np.array(PAPERS[paper]) - 5.0 + 1e-3)
 
@@ -125,14 +139,17 @@ def test_another_program_prints_the_same(tmp_path):
         assert np.hypot(*(corner[1] - corner[0])) == pytest.approx(160.0 / 25.4 * DPI, abs=2.5)
 
 
-@pytest.mark.parametrize(('arguments', 'rig', 'message'), [
-    (['--out', 'tags.png'], '', '--out must end in .pdf, got tags.png'),
-    (['--out', 'there.pdf'], '', 'there.pdf exists already, not overwriting'),
-    (['--out', 'tags.pdf'], 'size: 0.3', 'a tag of 300 mm is 375 mm wide with its white border; a4 takes tags of'),
-    (['--out', 'tags.pdf'], 'front.ids: [1]', 'tag 1 is mounted twice'),
-    (['--out', 'tags.pdf'], 'family: 99h9', 'family must be one of'),
-    (['--out', 'tags.pdf'], 'sise: 0.1', 'sise is not a parameter'),
-])
+@pytest.mark.parametrize(
+    ('arguments', 'rig', 'message'),
+    [
+        (['--out', 'tags.png'], '', '--out must end in .pdf, got tags.png'),
+        (['--out', 'there.pdf'], '', 'there.pdf exists already, not overwriting'),
+        (['--out', 'tags.pdf'], 'size: 0.3', 'a tag of 300 mm is 375 mm wide with its white border; a4 takes tags of'),
+        (['--out', 'tags.pdf'], 'front.ids: [1]', 'tag 1 is mounted twice'),
+        (['--out', 'tags.pdf'], 'family: 99h9', 'family must be one of'),
+        (['--out', 'tags.pdf'], 'sise: 0.1', 'sise is not a parameter'),
+    ],
+)
 def test_wrong_input_is_told_in_one_line(tmp_path, monkeypatch, capsys, arguments, rig, message):
     monkeypatch.chdir(tmp_path)
     Path('there.pdf').write_text('')

@@ -17,6 +17,8 @@ from dcdrw.cli import main
 from dcdrw_msgs_py.camera import read_camera, write_camera
 from tests import ROOT
 
+pytestmark = pytest.mark.processes
+
 cv2 = pytest.importorskip('cv2')
 
 RIG = '/**:\n  ros__parameters: {size: 0.3, k: 60.0}\n'
@@ -26,8 +28,24 @@ SECONDS = 4
 
 def make_film(folder, name, *options):
     (folder / 'given.yaml').write_text(RIG)
-    assert main(['film', '--out', str(folder / name), '--rig', str(folder / 'given.yaml'), '--initial-phase', '35',
-                 '--seconds', str(SECONDS), *SMALL, *options]) == 0
+    assert (
+        main(
+            [
+                'film',
+                '--out',
+                str(folder / name),
+                '--rig',
+                str(folder / 'given.yaml'),
+                '--initial-phase',
+                '35',
+                '--seconds',
+                str(SECONDS),
+                *SMALL,
+                *options,
+            ]
+        )
+        == 0
+    )
     return folder / name
 
 
@@ -37,8 +55,20 @@ def film(tmp_path_factory):
 
 
 def track(film, out, *more):
-    return main(['track', str(film), '--camera', str(film.with_suffix('.camera.yaml')), '--rig',
-                 str(film.with_suffix('.rig.yaml')), '--out', str(out), '--quiet', *more])
+    return main(
+        [
+            'track',
+            str(film),
+            '--camera',
+            str(film.with_suffix('.camera.yaml')),
+            '--rig',
+            str(film.with_suffix('.rig.yaml')),
+            '--out',
+            str(out),
+            '--quiet',
+            *more,
+        ]
+    )
 
 
 def rows(path):
@@ -54,14 +84,15 @@ def check_truth(film, out):
     samples, truth = rows(out / 'samples.csv'), {row['stamp_ns']: row for row in rows(film.with_suffix('.csv'))}
     truth = [truth[row['stamp_ns']] for row in samples]
     error = column(samples, 'phi') - column(truth, 'phi')
-    assert math.degrees(np.sqrt(np.mean(error ** 2))) < 0.2
+    assert math.degrees(np.sqrt(np.mean(error**2))) < 0.2
     assert np.sqrt(np.mean((column(samples, 'omega1') - column(truth, 'omega1')) ** 2)) < 0.1
     same = column(samples, 'step_difference') == column(truth, 'n')
     assert np.count_nonzero(~same) <= 3, 'but for a sample right at a strike'
     strikes = rows(film.with_suffix('.strikes.csv'))
     for fall in rows(out / 'footfalls.csv'):
-        off = [int(fall['stamp_ns']) - int(strike['stamp_ns'])
-               for strike in strikes if strike['wheel'] == fall['wheel']]
+        off = [
+            int(fall['stamp_ns']) - int(strike['stamp_ns']) for strike in strikes if strike['wheel'] == fall['wheel']
+        ]
         assert min(map(abs, off)) < 0.5e9 / 30
     return len(samples)
 
@@ -115,8 +146,10 @@ def test_a_part_of_a_film_is_tracked_by_itself(film, tmp_path):
 
 def test_interrupting_keeps_what_was_tracked(film, tmp_path):
     long = tmp_path / 'long.avi'
-    reader, writer = cv2.VideoCapture(str(film)), cv2.VideoWriter(str(long), cv2.VideoWriter_fourcc(*'MJPG'), 30.0,
-                                                                  (640, 360))
+    reader, writer = (
+        cv2.VideoCapture(str(film)),
+        cv2.VideoWriter(str(long), cv2.VideoWriter_fourcc(*'MJPG'), 30.0, (640, 360)),
+    )
     images = []
     while (read := reader.read())[0]:
         images.append(read[1])
@@ -125,9 +158,27 @@ def test_interrupting_keeps_what_was_tracked(film, tmp_path):
             writer.write(image)
     writer.release()
     process = subprocess.Popen(
-        [sys.executable, '-m', 'dcdrw.cli', 'track', str(long), '--camera', str(film.with_suffix('.camera.yaml')),
-         '--rig', str(film.with_suffix('.rig.yaml')), '--out', 'out', '--debug', 'debug.avi'], cwd=tmp_path,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, 'PYTHONPATH': str(ROOT)})
+        [
+            sys.executable,
+            '-m',
+            'dcdrw.cli',
+            'track',
+            str(long),
+            '--camera',
+            str(film.with_suffix('.camera.yaml')),
+            '--rig',
+            str(film.with_suffix('.rig.yaml')),
+            '--out',
+            'out',
+            '--debug',
+            'debug.avi',
+        ],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, 'PYTHONPATH': str(ROOT)},
+    )
     end = time.monotonic() + 60.0
     while not (tmp_path / 'debug.avi').exists() or (tmp_path / 'debug.avi').stat().st_size < 500_000:
         assert process.poll() is None
@@ -145,7 +196,7 @@ def test_interrupting_keeps_what_was_tracked(film, tmp_path):
 def test_a_truncated_video_is_told_and_what_came_before_is_kept(film, tmp_path, capsys):
     whole = make_film(tmp_path, 'whole.avi')
     content = whole.read_bytes()
-    whole.write_bytes(content[:len(content) // 2])
+    whole.write_bytes(content[: len(content) // 2])
     assert track(whole, tmp_path / 'out') == 1
     errors = capsys.readouterr().err
     assert f'of {SECONDS * 30} frames: it is truncated; what came before is kept' in errors
@@ -168,32 +219,39 @@ def raw_stream(path, frames=5):
     path.write_bytes(image * frames)
 
 
-@pytest.mark.parametrize(('arguments', 'message'), [
-    (['--rig', 'others.yaml'], 'no tag was seen; looked for 17 (front) and 18 (rear) of family 36h11'),
-    (['--rig', 'half.yaml'], 'the rear wheel was never seen; looked for tag 18 of family 36h11'),
-    (['--rig', 'twice.yaml'], 'rear.ids: tag 0 is mounted twice'),
-    (['--rig', 'detector.yaml'], "detector must be aruco or apriltag, got 'eyes'"),
-    (['--camera', 'nowhere.yaml'], 'nowhere.yaml'),
-    (['--camera', 'half.yaml'], 'half.yaml has no image_width: is it a camera_info file'),
-    (['--camera', 'large.yaml'], 'the picture is 640x360, but the camera is calibrated for 1280x720'),
-    (['nowhere.mp4'], 'there is no video nowhere.mp4'),
-    (['torn.mp4'], 'torn.mp4 is no video that OpenCV reads, or it is truncated'),
-    (['raw.mjpeg'], 'raw.mjpeg has no time stamps: set frame_rate'),
-    (['--out', 'full'], 'full exists already, not overwriting'),
-    (['--debug', 'half.yaml'], 'half.yaml exists already, not overwriting'),
-    (['--debug', 'video.gif'], 'a video must end in .mp4, .avi, .mkv, got video.gif'),
-    (['--from', '100', '--to', '200'], 'there is no frame between --from and --to'),
-    (['--from', '3', '--to', '2'], '--from must be ≥ 0 s and less than --to, got 3 and 2'),
-    (['--stamps', 'half.yaml'], 'half.yaml must have a heading, then a time stamp in ns a line'),
-    (['--stamps', 'few.csv'], 'has more frames than there are time stamps: 2'),
-    (['--stamps', 'back.csv'], 'back.csv: the time stamps must grow from line to line'),
-])
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        (['--rig', 'others.yaml'], 'no tag was seen; looked for 17 (front) and 18 (rear) of family 36h11'),
+        (['--rig', 'half.yaml'], 'the rear wheel was never seen; looked for tag 18 of family 36h11'),
+        (['--rig', 'twice.yaml'], 'rear.ids: tag 0 is mounted twice'),
+        (['--rig', 'detector.yaml'], "detector must be aruco or apriltag, got 'eyes'"),
+        (['--camera', 'nowhere.yaml'], 'nowhere.yaml'),
+        (['--camera', 'half.yaml'], 'half.yaml has no image_width: is it a camera_info file'),
+        (['--camera', 'large.yaml'], 'the picture is 640x360, but the camera is calibrated for 1280x720'),
+        (['nowhere.mp4'], 'there is no video nowhere.mp4'),
+        (['torn.mp4'], 'torn.mp4 is no video that OpenCV reads, or it is truncated'),
+        (['raw.mjpeg'], 'raw.mjpeg has no time stamps: set frame_rate'),
+        (['--out', 'full'], 'full exists already, not overwriting'),
+        (['--debug', 'half.yaml'], 'half.yaml exists already, not overwriting'),
+        (['--debug', 'video.gif'], 'a video must end in .mp4, .avi, .mkv, got video.gif'),
+        (['--from', '100', '--to', '200'], 'there is no frame between --from and --to'),
+        (['--from', '3', '--to', '2'], '--from must be ≥ 0 s and less than --to, got 3 and 2'),
+        (['--stamps', 'half.yaml'], 'half.yaml must have a heading, then a time stamp in ns a line'),
+        (['--stamps', 'few.csv'], 'has more frames than there are time stamps: 2'),
+        (['--stamps', 'back.csv'], 'back.csv: the time stamps must grow from line to line'),
+    ],
+)
 def test_wrong_input_is_told_in_one_line_and_leaves_nothing(film, tmp_path, monkeypatch, capfd, arguments, message):
     monkeypatch.chdir(tmp_path)
     camera = read_camera(film.with_suffix('.camera.yaml'))
     write_camera(Path('large.yaml'), camera._replace(width=1280, height=720))
-    for name, values in (('others', 'front.ids: [17], rear.ids: [18]'), ('half', 'rear.ids: [18]'),
-                         ('twice', 'rear.ids: [0]'), ('detector', 'detector: eyes')):
+    for name, values in (
+        ('others', 'front.ids: [17], rear.ids: [18]'),
+        ('half', 'rear.ids: [18]'),
+        ('twice', 'rear.ids: [0]'),
+        ('detector', 'detector: eyes'),
+    ):
         Path(f'{name}.yaml').write_text(f'/**:\n  ros__parameters: {{{values}}}\n')
     Path('full').mkdir()
     Path('full/summary.json').write_text('{}')
@@ -203,8 +261,13 @@ def test_wrong_input_is_told_in_one_line_and_leaves_nothing(film, tmp_path, monk
     raw_stream(Path('raw.mjpeg'))
     before = set(tmp_path.rglob('*'))
     video, options = (Path(arguments[0]), []) if len(arguments) == 1 else (film, arguments)
-    given = {'--camera': str(film.with_suffix('.camera.yaml')), '--rig': str(film.with_suffix('.rig.yaml')),
-             '--out': 'out', '--to': '1', **dict(zip(options[::2], options[1::2], strict=True))}
+    given = {
+        '--camera': str(film.with_suffix('.camera.yaml')),
+        '--rig': str(film.with_suffix('.rig.yaml')),
+        '--out': 'out',
+        '--to': '1',
+        **dict(zip(options[::2], options[1::2], strict=True)),
+    }
     assert main(['track', str(video), '--quiet', *(word for pair in given.items() for word in pair)]) == 2
     errors = capfd.readouterr().err
     assert message in errors
@@ -219,6 +282,22 @@ def test_a_stream_without_stamps_is_tracked_by_its_rate(film, tmp_path, monkeypa
     for _ in range(60):
         stream += cv2.imencode('.jpg', reader.read()[1])[1].tobytes()
     Path('raw.mjpeg').write_bytes(stream)
-    assert main(['track', 'raw.mjpeg', '--camera', str(film.with_suffix('.camera.yaml')), '--rig',
-                 str(film.with_suffix('.rig.yaml')), '--out', 'out', '--frame-rate', '30', '--quiet']) == 0
+    assert (
+        main(
+            [
+                'track',
+                'raw.mjpeg',
+                '--camera',
+                str(film.with_suffix('.camera.yaml')),
+                '--rig',
+                str(film.with_suffix('.rig.yaml')),
+                '--out',
+                'out',
+                '--frame-rate',
+                '30',
+                '--quiet',
+            ]
+        )
+        == 0
+    )
     assert check_truth(film, tmp_path / 'out') > 50

@@ -16,6 +16,8 @@ import pytest
 from dcdrw.cli import main
 from tests import ROOT
 
+pytestmark = pytest.mark.processes
+
 STIFF = """\
 /**:
   ros__parameters:
@@ -27,8 +29,13 @@ STIFF = """\
 def start(tmp_path: Path, *arguments: str, rig: str = STIFF) -> subprocess.Popen[str]:
     (tmp_path / 'rig.yaml').write_text(rig)
     return subprocess.Popen(
-        [sys.executable, '-m', 'dcdrw.cli', 'trial', '--rig', 'rig.yaml', '--out', 'out', *arguments], cwd=tmp_path,
-        env={**os.environ, 'PYTHONPATH': str(ROOT)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        [sys.executable, '-m', 'dcdrw.cli', 'trial', '--rig', 'rig.yaml', '--out', 'out', *arguments],
+        cwd=tmp_path,
+        env={**os.environ, 'PYTHONPATH': str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
 
 
 def wait_for_motion(process: subprocess.Popen[str]) -> None:
@@ -130,8 +137,10 @@ def test_nodes_end_with_a_trial_that_is_killed(tmp_path):
     process.kill()
     process.communicate()
     end = time.monotonic() + 10
-    while any(Path(f'/proc/{node}').exists() and 'Z' not in Path(f'/proc/{node}/stat').read_text().split()[2]
-              for node in nodes):
+    while any(
+        Path(f'/proc/{node}').exists() and 'Z' not in Path(f'/proc/{node}/stat').read_text().split()[2]
+        for node in nodes
+    ):
         assert time.monotonic() < end, 'orphans live on'
         time.sleep(0.05)
 
@@ -145,17 +154,20 @@ def test_stalled_rig_is_said_to_stall(tmp_path):
     assert 'stalled after' in output
 
 
-@pytest.mark.parametrize(('arguments', 'message'), [
-    (['--rig', 'nowhere.yaml'], 'nowhere.yaml'),
-    (['--rig', 'broken.yaml'], 'broken.yaml is not YAML'),
-    (['--rig', 'list.yaml'], 'list.yaml is not a parameter file'),
-    (['--rig', 'typo.yaml'], 'sloop is not a parameter (typo.yaml); did you mean slope?'),
-    (['--rig', 'gentle.yaml'], 'is too gentle'),
-    (['--rig', 'stranger.yaml'], 'stranger.yaml has parameters for simulater, which no trial has'),
-    (['--rig', 'clock.yaml'], 'a trial runs in real time: publish_clock must be false'),
-    (['--initial-phase', '120'], 'initial_phase_percent must be'),
-    (['--out', 'full'], 'full exists already, not overwriting'),
-])
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        (['--rig', 'nowhere.yaml'], 'nowhere.yaml'),
+        (['--rig', 'broken.yaml'], 'broken.yaml is not YAML'),
+        (['--rig', 'list.yaml'], 'list.yaml is not a parameter file'),
+        (['--rig', 'typo.yaml'], 'sloop is not a parameter (typo.yaml); did you mean slope?'),
+        (['--rig', 'gentle.yaml'], 'is too gentle'),
+        (['--rig', 'stranger.yaml'], 'stranger.yaml has parameters for simulater, which no trial has'),
+        (['--rig', 'clock.yaml'], 'a trial runs in real time: publish_clock must be false'),
+        (['--initial-phase', '120'], 'initial_phase_percent must be'),
+        (['--out', 'full'], 'full exists already, not overwriting'),
+    ],
+)
 def test_wrong_input_is_told_in_one_line(tmp_path, monkeypatch, capsys, arguments, message):
     monkeypatch.chdir(tmp_path)
     Path('broken.yaml').write_text('a: [')

@@ -16,6 +16,8 @@ from dcdrw_msgs_py.samples import PhaseSample, Turn
 pytest.importorskip('cv2')
 from tests import ROOT
 
+pytestmark = pytest.mark.processes
+
 RIG = """\
 /**:
   ros__parameters: {k: 60.0, rate: 200.0, size: 0.3}
@@ -27,9 +29,28 @@ virtual_camera:
 def test_a_filmed_trial_is_the_simulated_one(tmp_path):
     (tmp_path / 'rig.yaml').write_text(RIG)
     done = subprocess.run(
-        [sys.executable, '-m', 'dcdrw.cli', 'trial', '--camera', '--rig', 'rig.yaml', '--initial-phase', '35',
-         '--seconds', '4', '--out', 'out'], cwd=tmp_path, env={**os.environ, 'PYTHONPATH': str(ROOT)},
-        capture_output=True, text=True, timeout=120, check=False)
+        [
+            sys.executable,
+            '-m',
+            'dcdrw.cli',
+            'trial',
+            '--camera',
+            '--rig',
+            'rig.yaml',
+            '--initial-phase',
+            '35',
+            '--seconds',
+            '4',
+            '--out',
+            'out',
+        ],
+        cwd=tmp_path,
+        env={**os.environ, 'PYTHONPATH': str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     assert "Against the simulator's own joint states, φ is 0." in done.stdout
     result = json.loads((tmp_path / 'out' / 'summary.json').read_text())
@@ -49,12 +70,15 @@ def test_held_wheels_do_not_move_though_a_camera_sees_them_tremble(rate, moving)
     assert moves(PhaseSample(0, Turn(0.1, rate), Turn(0.1, 0.01), Turn(0.1, 0.0), 0)) is moving
 
 
-@pytest.mark.parametrize(('values', 'message'), [
-    ('rear.ids: [0]', 'rear.ids: tag 0 is mounted twice'),
-    ('camera: nowhere.yaml', 'nowhere.yaml'),
-    ('occlude: all', 'occlude must be front, rear, both or empty'),
-    ('encoding: rgb8', 'encoding must be mono8 or bgr8'),
-])
+@pytest.mark.parametrize(
+    ('values', 'message'),
+    [
+        ('rear.ids: [0]', 'rear.ids: tag 0 is mounted twice'),
+        ('camera: nowhere.yaml', 'nowhere.yaml'),
+        ('occlude: all', 'occlude must be front, rear, both or empty'),
+        ('encoding: rgb8', 'encoding must be mono8 or bgr8'),
+    ],
+)
 def test_what_cannot_be_filmed_is_told_in_one_line(tmp_path, monkeypatch, capsys, values, message):
     monkeypatch.chdir(tmp_path)
     Path('rig.yaml').write_text(f'virtual_camera:\n  ros__parameters: {{{values}}}\n')

@@ -158,8 +158,11 @@ def test_what_is_written_is_the_phase_the_coupler_and_what_the_monitor_says():
     view = view_of(RigParams())
     view.update(JointSample(1, Turn(0.0, 1.0), Turn(-math.pi / 24, 1.0), CouplerSample(1.2, 0.0, -3.25)))
     *_, label = view.shapes(Diagnosis(Level.WARN, 'slipped a step: n = 2', {}))
-    assert label.text.splitlines() == ['25.0 % of a step, 12.5 % of a stride', 'n = 0, coupler -3.2 N',
-                                       'slipped a step: n = 2']
+    assert label.text.splitlines() == [
+        '25.0 % of a step, 12.5 % of a stride',
+        'n = 0, coupler -3.2 N',
+        'slipped a step: n = 2',
+    ]
     view.update(JointSample(2, Turn(0.0, 1.0), Turn(-math.pi / 24, 1.0)))
     *_, silent = view.shapes()
     assert silent.text.splitlines()[1:] == ['n = 0']

@@ -2,6 +2,7 @@
 
 import time
 
+import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
@@ -11,6 +12,8 @@ from dcdrw_msgs_py.messages import JointSampleWriter, stamp_ns
 from dcdrw_msgs_py.samples import CouplerSample, JointSample, Turn
 from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, RIG_MARKERS
 from tests.bench import Bench
+
+pytestmark = pytest.mark.processes
 
 MILLISECOND = 1_000_000
 SPEED = 1.0
@@ -31,8 +34,11 @@ class Source:
         angle = SPEED * 0.01 * self.count
         stamp = self.start_ns + self.count * 10 * MILLISECOND
         self.count += 1
-        self.publisher.publish(self.writer.write(JointSample(
-            stamp, Turn(angle, SPEED), Turn(angle - 0.2, SPEED), CouplerSample(1.2, 0.0, 3.0))))
+        self.publisher.publish(
+            self.writer.write(
+                JointSample(stamp, Turn(angle, SPEED), Turn(angle - 0.2, SPEED), CouplerSample(1.2, 0.0, 3.0))
+            )
+        )
         self.bench.spin(0.005)
         return stamp
 
@@ -40,6 +46,7 @@ class Source:
         def done():
             self.send()
             return condition()
+
         return self.bench.wait(done, what)
 
 
@@ -64,8 +71,11 @@ def test_a_sample_becomes_markers_that_take_each_others_place(bench):
         assert len({(marker.ns, marker.id) for marker in added}) == len(added)
         assert all(marker.lifetime.sec > 0 for marker in added)
     assert {marker.ns for marker in drawings[-1].markers} == {
-        'slope', 'coupler', 'label', *(f'{wheel}_{part}' for wheel in ('front', 'rear')
-                                       for part in ('wheel', 'stance_leg', 'footfalls'))}
+        'slope',
+        'coupler',
+        'label',
+        *(f'{wheel}_{part}' for wheel in ('front', 'rear') for part in ('wheel', 'stance_leg', 'footfalls')),
+    }
     assert [starts_afresh(message) for message in drawings[1:]].count(True) == 0  # only the first, which may be missed
     leg = next(marker for marker in drawings[-1].markers if marker.ns == 'rear_stance_leg')
     assert leg.type == Marker.LINE_LIST
@@ -85,8 +95,10 @@ def test_it_says_what_the_monitor_says_and_that_data_have_ended(bench):
     bench.start('rig_markers')
     drawings, source = bench.hear(RIG_MARKERS), Source(bench)
     diagnostics = bench.publisher(DIAGNOSTICS)
-    status = [DiagnosticStatus(name='other', level=b'\x02', message='boo'),
-              DiagnosticStatus(name='sync_monitor', level=b'\x01', message='slipped a step: n = 2')]
+    status = [
+        DiagnosticStatus(name='other', level=b'\x02', message='boo'),
+        DiagnosticStatus(name='sync_monitor', level=b'\x01', message='slipped a step: n = 2'),
+    ]
 
     def said():
         diagnostics.publish(DiagnosticArray(status=status))
@@ -103,7 +115,11 @@ def test_its_health_is_told_in_the_group_of_the_suite(bench):
     bench.wait(lambda: told, 'diagnostics')
     (status,) = told[0].status
     assert (status.name, status.hardware_id, status.level, status.message) == (
-        'rig_markers', 'dcdrw', DiagnosticStatus.STALE, 'no data yet')
+        'rig_markers',
+        'dcdrw',
+        DiagnosticStatus.STALE,
+        'no data yet',
+    )
     source = Source(bench)
     source.until(lambda: told[-1].status[0].level == DiagnosticStatus.OK, 'the word that it draws')
 
@@ -122,8 +138,11 @@ def test_the_frame_can_be_made_to_stay(bench):
     drawings, source = bench.hear(RIG_MARKERS), Source(bench)
     source.until(lambda: drawings, 'a drawing')
     stay = Parameter(name='follow', value=ParameterValue(type=ParameterType.PARAMETER_BOOL, bool_value=False))
-    assert bench.call(SetParameters, '/rig_markers/set_parameters',
-                      SetParameters.Request(parameters=[stay])).results[0].successful
+    assert (
+        bench.call(SetParameters, '/rig_markers/set_parameters', SetParameters.Request(parameters=[stay]))
+        .results[0]
+        .successful
+    )
 
     def far():
         leg = next(marker for marker in drawings[-1].markers if marker.ns == 'rear_stance_leg')

@@ -23,6 +23,8 @@ from tests import ROOT
 from tests.bench import PATIENCE, Bench
 from tests.chromium import Chromium, Tab
 
+pytestmark = pytest.mark.processes
+
 STIFF = {'k': 60.0, 'rate': 100.0, 'initial_phase_percent': 30.0}
 STATE = 'document.body.dataset.state'
 RIG = "JSON.stringify(document.getElementById('rig-canvas').dataset)"
@@ -54,8 +56,11 @@ class Live:
     def start(self, *arguments: str) -> str:
         """Start, and return the address."""
         process = subprocess.Popen(
-            [sys.executable, '-m', 'dcdrw.cli', 'live', '--port', self._port, *arguments], env=self._environment,
-            stdout=subprocess.PIPE, text=True)
+            [sys.executable, '-m', 'dcdrw.cli', 'live', '--port', self._port, *arguments],
+            env=self._environment,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
         self._processes.append(process)
         assert process.stdout
         told = next(line for line in process.stdout if line.startswith('Live at'))
@@ -112,8 +117,9 @@ def test_what_is_drawn_follows_the_data(bench, live, chromium):
     while seen < 15:  # what is drawn is what the topics said at its stamp
         now = bench.wait(lambda: drawn(tab).get('stampNs') and drawn(tab), 'a drawing')
         try:
-            phase, joint = (bench.wait(partial(at, now['stampNs'], heard), 'what was drawn', 2.0)
-                            for heard in (phases, joints))
+            phase, joint = (
+                bench.wait(partial(at, now['stampNs'], heard), 'what was drawn', 2.0) for heard in (phases, joints)
+            )
         except AssertionError:  # a sample that this listener lost, or has come too late for
             unheard += 1
             assert unheard < 10
@@ -192,8 +198,10 @@ def click(tab: Tab, name: str) -> None:
 
 
 def enter(tab: Tab, name: str, value: float) -> None:
-    tab.value(f"(() => {{ const field = document.getElementById('{name}-field'); field.value = {value}; "
-              "field.dispatchEvent(new Event('change')); })()")
+    tab.value(
+        f"(() => {{ const field = document.getElementById('{name}-field'); field.value = {value}; "
+        "field.dispatchEvent(new Event('change')); })()"
+    )
 
 
 def test_page_outlives_nodes_servers_and_sleep(bench, live, chromium):

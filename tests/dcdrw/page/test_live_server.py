@@ -16,6 +16,8 @@ from dcdrw.page.live_page import PAGE, PageServer, listen_at
 from dcdrw.page.live_state import read_command
 from tests import ROOT
 
+pytestmark = pytest.mark.processes
+
 TOKEN = 'a-token-of-tests'
 KEPT = 5
 PATIENCE = 20.0
@@ -54,6 +56,7 @@ def browse(visit: Callable[[ClientSession], Awaitable[Any]]) -> Any:
     async def session() -> Any:
         async with ClientSession(cookie_jar=CookieJar(unsafe=True)) as client:  # which keeps cookies of addresses
             return await asyncio.wait_for(visit(client), PATIENCE)
+
     return asyncio.run(session())
 
 
@@ -61,17 +64,20 @@ def status(address: str, **headers: str) -> int:
     async def visit(client: ClientSession) -> int:
         async with client.get(address, headers=headers) as answer:
             return answer.status
+
     return int(browse(visit))
 
 
 def handshake(address: str, **headers: str) -> int:
     """101 where the WebSocket opens; else the status with which it is refused."""
+
     async def visit(client: ClientSession) -> int:
         try:
             async with client.ws_connect(address, headers=headers):
                 return 101
         except WSServerHandshakeError as error:
             return error.status
+
     return int(browse(visit))
 
 
@@ -93,8 +99,14 @@ def test_page_is_whole_and_asks_nothing_of_other_machines(served):
 
 
 def test_without_token_only_names_of_this_machine_are_served(served):
-    for host, expected in ((f'localhost:{served.port}', 200), (f'[::1]:{served.port}', 200), ('127.0.0.9', 200),
-                           (f'rebound.example:{served.port}', 403), ('10.0.0.7', 403), ('[', 403)):
+    for host, expected in (
+        (f'localhost:{served.port}', 200),
+        (f'[::1]:{served.port}', 200),
+        ('127.0.0.9', 200),
+        (f'rebound.example:{served.port}', 403),
+        ('10.0.0.7', 403),
+        ('[', 403),
+    ):
         assert status(served.address, Host=host) == expected, host
         assert handshake(f'{served.address}/ws', Host=host) == (101 if expected == 200 else 403), host
 
@@ -103,8 +115,16 @@ def test_other_sites_cannot_open_the_socket(served, guarded):
     for one, query in ((served, ''), (guarded, f'?token={TOKEN}')):
         socket_address = f'{one.address}/ws{query}'
         assert handshake(socket_address, Origin=one.address) == 101
-        for origin in ('http://evil.example', f'http://evil.example:{one.port}', 'null', 'file://',
-                       f'http://127.0.0.1:{one.port}.evil.example', 'http://127.0.0.1:1', 'http://[', ''):
+        for origin in (
+            'http://evil.example',
+            f'http://evil.example:{one.port}',
+            'null',
+            'file://',
+            f'http://127.0.0.1:{one.port}.evil.example',
+            'http://127.0.0.1:1',
+            'http://[',
+            '',
+        ):
             assert handshake(socket_address, Origin=origin) == 403, origin
 
 
@@ -197,13 +217,16 @@ def test_wrong_command_is_answered_and_a_right_one_handed_on(served):
     assert served.commands[0][:] == ('set', 'k', 3.0)
 
 
-@pytest.mark.parametrize(('arguments', 'message'), [
-    (['--host', '0.0.0.0'], '0.0.0.0 is open to others: give a --token, or --token auto'),
-    (['--host', '192.0.2.7', '--token', ''], 'is open to others'),
-    (['--token', 'short'], '--token must have at least 8 characters'),
-    (['--host', '192.0.2.7', '--token', 'auto'], 'cannot serve at 192.0.2.7 port 8800'),
-    (['--rig', 'nowhere.yaml'], 'nowhere.yaml'),
-])
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        (['--host', '0.0.0.0'], '0.0.0.0 is open to others: give a --token, or --token auto'),
+        (['--host', '192.0.2.7', '--token', ''], 'is open to others'),
+        (['--token', 'short'], '--token must have at least 8 characters'),
+        (['--host', '192.0.2.7', '--token', 'auto'], 'cannot serve at 192.0.2.7 port 8800'),
+        (['--rig', 'nowhere.yaml'], 'nowhere.yaml'),
+    ],
+)
 def test_wrong_input_is_told_in_one_line(capsys, arguments, message):
     pytest.importorskip('rclpy')
     assert main(['live', *arguments]) == 2
@@ -221,8 +244,10 @@ def test_port_in_use_is_told_in_one_line(capsys):
     assert errors.count('\n') == 1
 
 
-@pytest.mark.parametrize('arguments', [
-    ['--namespace', 'no space'], ['--namespace', 'a//b'], ['--port', '65536'], ['--port', 'x'], ['--domain', '-1']])
+@pytest.mark.parametrize(
+    'arguments',
+    [['--namespace', 'no space'], ['--namespace', 'a//b'], ['--port', '65536'], ['--port', 'x'], ['--domain', '-1']],
+)
 def test_impossible_option_is_refused(capsys, arguments):
     with pytest.raises(SystemExit):
         main(['live', *arguments])
@@ -232,8 +257,13 @@ def test_impossible_option_is_refused(capsys, arguments):
 @pytest.mark.parametrize('module', ['rclpy', 'aiohttp'])
 def test_what_is_missing_is_told_in_one_line(module):
     code = f'import sys; sys.modules[{module!r}] = None; from dcdrw.cli import main; sys.exit(main(["live"]))'
-    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=False,
-                          env={**os.environ, 'PYTHONPATH': str(ROOT)})
+    done = subprocess.run(
+        [sys.executable, '-c', code],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, 'PYTHONPATH': str(ROOT)},
+    )
     assert done.returncode == 2
     assert done.stderr.startswith(f'dcdrw live: the live page needs {module}:')
     assert done.stderr.count('\n') == 1

@@ -29,13 +29,18 @@ from dcdrw_sim.rig.simulator import SimulatedRig
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseUpdate
 
 START_NS = 1_700_000_000_000_000_000
-UNEQUAL = RigParams(front=WheelParams(0.9, 9.0, 12.0), rear=WheelParams(1.0, 11.0, 13.0), k=60.0, b=150.0,
-                    slope=math.radians(3.0))
+UNEQUAL = RigParams(
+    front=WheelParams(0.9, 9.0, 12.0), rear=WheelParams(1.0, 11.0, 13.0), k=60.0, b=150.0, slope=math.radians(3.0)
+)
 RIGS = [RigParams(), UNEQUAL]
 
 
-def walk(rig: RigParams, seconds: float, rate: float = 500.0, begin: float = 0.0,
-         ) -> Iterator[tuple[float, JointSample, PhaseUpdate]]:
+def walk(
+    rig: RigParams,
+    seconds: float,
+    rate: float = 500.0,
+    begin: float = 0.0,
+) -> Iterator[tuple[float, JointSample, PhaseUpdate]]:
     """A simulated rig through the estimator, which may come late."""
     params = TrialParams.of_rig(rig)
     source, estimator = SimulatedRig(rig, params.simulator), PhaseEstimator(params.phase)
@@ -64,8 +69,9 @@ def frames(rig: RigParams, seconds: float, begin: float = 0.0, coupler: bool = T
 def hubs(rig: RigParams, drawn: dict[str, Any]) -> float:
     """Distance of the hubs as drawn: foot, stance leg, stance leg, foot."""
     (theta1, theta2), l1, l2 = drawn['theta'], rig.front.length, rig.rear.length
-    return math.hypot(drawn['S'] + l1 * math.sin(theta1) - l2 * math.sin(theta2),
-                      l1 * math.cos(theta1) - l2 * math.cos(theta2))
+    return math.hypot(
+        drawn['S'] + l1 * math.sin(theta1) - l2 * math.sin(theta2), l1 * math.cos(theta1) - l2 * math.cos(theta2)
+    )
 
 
 @pytest.mark.parametrize('begin', [0.0, 1.3])
@@ -73,8 +79,11 @@ def hubs(rig: RigParams, drawn: dict[str, Any]) -> float:
 def test_feet_stand_still_between_strikes_whenever_the_page_opens(rig, begin):
     stances = [frame['rig']['S'] for frame in frames(rig, 6.0, begin)]
     moves = {0.0, rig.front.step_length, -rig.rear.step_length}
-    seen = {min(moves, key=lambda move: abs(move - (now - last))) for last, now in pairwise(stances)
-            if min(abs(move - (now - last)) for move in moves) < 1e-3}
+    seen = {
+        min(moves, key=lambda move: abs(move - (now - last)))
+        for last, now in pairwise(stances)
+        if min(abs(move - (now - last)) for move in moves) < 1e-3
+    }
     assert seen == moves
     odd = [now - last for last, now in pairwise(stances) if min(abs(move - (now - last)) for move in moves) > 1e-3]
     # both wheels within one frame
@@ -211,27 +220,35 @@ def test_command_is_read_or_refused_with_the_reason():
     assert read_command('{"do": "pause", "value": true}') == Command('pause', value=True)
     assert read_command('{"do": "reset"}') == Command('reset')
     for text, reason in (
-            ('{"do": "set", "name": "k", "value": -1}', r'k must be ≥ 0 N/m, got -1'),
-            ('{"do": "set", "name": "slope", "value": 2}', 'slope must be'),
-            ('{"do": "set", "name": "k", "value": "1"}', 'k must be a number'),
-            ('{"do": "set", "name": "rate", "value": 1}', 'not a command'),
-            ('{"do": "set", "name": [], "value": 1}', 'not a command'),
-            ('{"do": "pause", "value": 1}', 'not a command'),
-            ('[]', 'must be an object'), ('{', 'Expecting'), ('', 'Expecting')):
+        ('{"do": "set", "name": "k", "value": -1}', r'k must be ≥ 0 N/m, got -1'),
+        ('{"do": "set", "name": "slope", "value": 2}', 'slope must be'),
+        ('{"do": "set", "name": "k", "value": "1"}', 'k must be a number'),
+        ('{"do": "set", "name": "rate", "value": 1}', 'not a command'),
+        ('{"do": "set", "name": [], "value": 1}', 'not a command'),
+        ('{"do": "pause", "value": 1}', 'not a command'),
+        ('[]', 'must be an object'),
+        ('{', 'Expecting'),
+        ('', 'Expecting'),
+    ):
         with pytest.raises(ValueError, match=reason):
             read_command(text)
 
 
 numbers = st.floats(allow_nan=True, allow_infinity=True)
 turns = st.builds(Turn, numbers | st.floats(-4.0, 4.0), numbers)
-stamps = st.integers(-2**62, 2**62) | st.integers(0, 5).map(lambda i: START_NS + i * 20_000_000)
+stamps = st.integers(-(2**62), 2**62) | st.integers(0, 5).map(lambda i: START_NS + i * 20_000_000)
 
 
-@given(st.lists(st.one_of(
-    st.builds(JointSample, stamps, turns, turns, st.builds(CouplerSample, numbers, numbers, numbers)),
-    st.builds(PhaseSample, stamps, turns, turns, turns, st.integers(-9, 9), st.integers(0, 2)),
-    st.builds(Footfall, st.sampled_from(['front', 'rear', 'other']), stamps, numbers, st.integers(-9, 9))),
-    max_size=20))
+@given(
+    st.lists(
+        st.one_of(
+            st.builds(JointSample, stamps, turns, turns, st.builds(CouplerSample, numbers, numbers, numbers)),
+            st.builds(PhaseSample, stamps, turns, turns, turns, st.integers(-9, 9), st.integers(0, 2)),
+            st.builds(Footfall, st.sampled_from(['front', 'rear', 'other']), stamps, numbers, st.integers(-9, 9)),
+        ),
+        max_size=20,
+    )
+)
 def test_frame_is_json_whatever_comes(samples):
     state = LiveState(TrialParams())
     for sample in samples:

@@ -24,6 +24,8 @@ from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, SYNCHRONIZED, Topic
 from tests import ROOT
 from tests.bags import TYPES
 
+pytestmark = pytest.mark.processes
+
 FILE = 'bag/bag_0.mcap'
 IMAGE = Topic('image_raw', 'sensor_msgs/msg/Image', '')
 
@@ -69,8 +71,9 @@ def test_messages_are_kept_as_they_came_off_the_wire(bench, tmp_path):
     latched.publish(Bool(data=True))  # before the recorder is there
     process, joints, _ = start(bench, tmp_path / 'bag', topics='image_raw')
     images = bench.publisher(IMAGE)
-    bench.wait(lambda: images.publish(Image(height=1, width=2, step=2, data=b'ab')) or (tmp_path / FILE).stat(),
-               'an image')
+    bench.wait(
+        lambda: images.publish(Image(height=1, width=2, step=2, data=b'ab')) or (tmp_path / FILE).stat(), 'an image'
+    )
     sent = [send(bench, joints) for _ in range(60)]
     bench.spin(0.5)
     images.publish(Image(height=1, width=2, step=2, data=b'ab'))
@@ -78,8 +81,10 @@ def test_messages_are_kept_as_they_came_off_the_wire(bench, tmp_path):
     assert bench.end(process) == 0
     with Reader(tmp_path / 'bag') as reader:
         kinds = {topic: info.msgtype for topic, info in reader.topics.items()}
-        messages = [(connection.topic, TYPES.deserialize_cdr(data, connection.msgtype))
-                    for connection, _, data in reader.messages()]
+        messages = [
+            (connection.topic, TYPES.deserialize_cdr(data, connection.msgtype))
+            for connection, _, data in reader.messages()
+        ]
         offered = {c.topic: c.ext.offered_qos_profiles[0] for c in reader.connections}
     assert kinds['/joint_states'] == 'sensor_msgs/msg/JointState'
     assert [m.data for topic, m in messages if topic == '/synchronized'] == [True]
@@ -126,11 +131,17 @@ def test_full_disk_ends_the_recording_and_keeps_what_is_there(bench, tmp_path):
 def test_command_ends_with_a_message_where_the_disk_is_full(bench, tmp_path):
     joints = bench.publisher(JOINT_STATES, readers=0)
     process = subprocess.Popen(
-        [sys.executable, '-m', 'dcdrw.cli', 'record', '--out', 'bag', '--domain', str(bench.domain)], cwd=tmp_path,
-        env={**os.environ, 'PYTHONPATH': str(ROOT)}, stderr=subprocess.PIPE, text=True)
+        [sys.executable, '-m', 'dcdrw.cli', 'record', '--out', 'bag', '--domain', str(bench.domain)],
+        cwd=tmp_path,
+        env={**os.environ, 'PYTHONPATH': str(ROOT)},
+        stderr=subprocess.PIPE,
+        text=True,
+    )
     bench.processes.append(process)
-    bench.wait(lambda: send(bench, joints) and (tmp_path / FILE).exists() and (tmp_path / FILE).stat().st_size > 6_000,
-               'a chunk')
+    bench.wait(
+        lambda: send(bench, joints) and (tmp_path / FILE).exists() and (tmp_path / FILE).stat().st_size > 6_000,
+        'a chunk',
+    )
     resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (6_000, 6_000))
     bench.wait(lambda: send(bench, joints) and process.poll() is not None, 'the end')
     assert process.returncode == 1
@@ -185,8 +196,10 @@ def test_unknown_type_is_refused_and_harms_nothing(tmp_path):
 
 
 def test_missing_library_is_told_in_one_line():
-    code = ('import sys; sys.modules["rosbags"] = None; from dcdrw.cli import main; '
-            'sys.exit(main(["record"]) or main(["analyze", "."]))')
+    code = (
+        'import sys; sys.modules["rosbags"] = None; from dcdrw.cli import main; '
+        'sys.exit(main(["record"]) or main(["analyze", "."]))'
+    )
     done = subprocess.run([sys.executable, '-c', code], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert done.stderr == "dcdrw record: a recording needs rosbags and mcap: pip install 'dcdrw[record]'\n"

@@ -22,8 +22,9 @@ numbers = st.lists(st.floats(width=64), max_size=5)
 letters = st.text(st.characters(codec='utf-8', exclude_characters='\0'), max_size=9)
 
 
-@given(st.integers(0, 2**31 * 10**9 - 1), st.lists(letters, max_size=5), numbers, numbers, numbers, letters,
-       st.booleans())
+@given(
+    st.integers(0, 2**31 * 10**9 - 1), st.lists(letters, max_size=5), numbers, numbers, numbers, letters, st.booleans()
+)
 def test_joints_are_read_as_rosbags_reads_them(stamp_ns, names, position, velocity, effort, frame, little):
     data = joint_state(stamp_ns, names, position, velocity, effort, frame, little)
     (batch,) = decode_joints([data])
@@ -93,14 +94,15 @@ def test_recording_cut_anywhere_keeps_every_whole_chunk(unclosed, tmp_path_facto
         assert reader.message_count == whole
         assert sum(1 for _ in reader.messages()) == whole
         assert reader.topics['/synchronized'].connections[0].ext.offered_qos_profiles[0].durability.name == (
-            'TRANSIENT_LOCAL')
+            'TRANSIENT_LOCAL'
+        )
         assert reader.storage.metadata.custom['note'] == 'cut me'
 
 
 def ends_of_chunks(content: bytes) -> list[int]:
     ends, at = [], 8
     while at < len(content):
-        length = int.from_bytes(content[at + 1:at + 9], 'little')
+        length = int.from_bytes(content[at + 1 : at + 9], 'little')
         if content[at] == 6:
             ends.append(at + 9 + length - 1)
         at += 9 + length
@@ -128,10 +130,16 @@ def test_lock_is_the_recorders(tmp_path):
 MESSAGES = [(10**18 + k * 10**7, joint_state(k, ['front_wheel', 'rear_wheel'], [k, -k])) for k in range(300)]
 
 
-@pytest.mark.parametrize(('storage', 'compression'), [
-    (StoragePlugin.MCAP, CompressionMode.NONE), (StoragePlugin.MCAP, CompressionMode.STORAGE),
-    (StoragePlugin.SQLITE3, CompressionMode.NONE), (StoragePlugin.SQLITE3, CompressionMode.MESSAGE),
-    (StoragePlugin.SQLITE3, CompressionMode.FILE)])
+@pytest.mark.parametrize(
+    ('storage', 'compression'),
+    [
+        (StoragePlugin.MCAP, CompressionMode.NONE),
+        (StoragePlugin.MCAP, CompressionMode.STORAGE),
+        (StoragePlugin.SQLITE3, CompressionMode.NONE),
+        (StoragePlugin.SQLITE3, CompressionMode.MESSAGE),
+        (StoragePlugin.SQLITE3, CompressionMode.FILE),
+    ],
+)
 def test_bags_of_others_are_read(tmp_path, storage, compression):
     bag = write_bag(tmp_path / 'bag', MESSAGES, '/lab/joint_states', storage, compression)
     with Recording(bag) as recording:
@@ -174,14 +182,15 @@ def test_wrong_files_are_told_apart(tmp_path):
     for part in ('parts_0.mcap', 'parts_1.mcap'):
         (tmp_path / 'parts' / part).write_bytes(b'\x89MCAP0\r\n')
     for name, message in {
-            'nowhere': 'does not exist',
-            'empty': 'is no recording: it has neither metadata.yaml nor an .mcap or .db3 file',
-            'notes.txt': 'is no recording: give its folder, an .mcap or a .db3 file',
-            'text.mcap': 'cannot be read: File magic is invalid',
-            'text.db3': 'cannot be read: ',
-            'short.mcap': 'nothing was recorded',
-            'torn': 'cannot be read: ',
-            'parts': 'run ros2 bag reindex'}.items():
+        'nowhere': 'does not exist',
+        'empty': 'is no recording: it has neither metadata.yaml nor an .mcap or .db3 file',
+        'notes.txt': 'is no recording: give its folder, an .mcap or a .db3 file',
+        'text.mcap': 'cannot be read: File magic is invalid',
+        'text.db3': 'cannot be read: ',
+        'short.mcap': 'nothing was recorded',
+        'torn': 'cannot be read: ',
+        'parts': 'run ros2 bag reindex',
+    }.items():
         with pytest.raises(ValueError, match=re.escape(message)) as caught:
             Recording(tmp_path / name)
         assert name in str(caught.value)
@@ -192,6 +201,7 @@ def test_topics_are_found_in_any_namespace_unless_several_fit(tmp_path):
     bag = write_bag(tmp_path / 'bag', MESSAGES[:3], '/rig/encoders')
     with Recording(bag) as recording:
         assert recording.find('encoders') == recording.find('/rig/encoders') == '/rig/encoders'
-        with pytest.raises(ValueError, match='no topic joint_states of sensor_msgs/msg/JointState; of this type it '
-                                             'has: /rig/encoders'):
+        with pytest.raises(
+            ValueError, match='no topic joint_states of sensor_msgs/msg/JointState; of this type it has: /rig/encoders'
+        ):
             recording.find('joint_states')

@@ -20,7 +20,8 @@ from tests import ROOT
 TOPICS = {f'/{topic.name.lstrip("/")}': topic for node in EXECUTABLES for topic in (*node.subscribes, *node.publishes)}
 JOINTS = {
     JOINT_STATES: JointSampleWriter().write(
-        JointSample(1, Turn(1.0, 2.0), Turn(3.0, 4.0), CouplerSample(5.0, 6.0, 7.0))),
+        JointSample(1, Turn(1.0, 2.0), Turn(3.0, 4.0), CouplerSample(5.0, 6.0, 7.0))
+    ),
     PHASE_STATE: PhaseSampleWriter().write(PhaseSample(1, Turn(0.1, 1.0), Turn(0.2, 2.0), Turn(0.3, 3.0), 4)),
 }
 
@@ -57,9 +58,13 @@ def test_foxglove_places_each_of_its_panels_once():
 
 def test_foxglove_plots_what_its_labels_say():
     panels = foxglove()['configById']
-    plotted = {series['label']: message_path(series['value'])[1]
-               for name, panel in panels.items() if name.startswith('Plot')
-               for series in panel['paths'] if series['value'].startswith('/')}
+    plotted = {
+        series['label']: message_path(series['value'])[1]
+        for name, panel in panels.items()
+        if name.startswith('Plot')
+        for series in panel['paths']
+        if series['value'].startswith('/')
+    }
     assert plotted == {'error': 0.0, 'φ': 0.0, 'θ1 front': 0.1, 'θ2 rear': 0.2, 'F': 7.0}
     for name, panel in panels.items():
         for series in panel.get('paths', ()):
@@ -93,7 +98,7 @@ def test_plotjuggler_curves_are_named_as_its_ros2_parser_names_them():
     assert len(curves) >= 10
     for curve in curves:
         name = max((name for name in TOPICS if curve.startswith(f'{name}/')), key=len)
-        path, message = curve[len(name) + 1:].split('/'), content(TOPICS[name])
+        path, message = curve[len(name) + 1 :].split('/'), content(TOPICS[name])
         if TOPICS[name] in JOINTS:
             joint, field = path
             value = getattr(message, field)[list(message.name).index(joint)]

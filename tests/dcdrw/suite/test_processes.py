@@ -9,6 +9,8 @@ import pytest
 from dcdrw.suite import processes
 from dcdrw.suite.processes import NodeProcess, free_domain
 
+pytestmark = pytest.mark.processes
+
 
 def test_two_trials_never_share_a_domain():
     with ExitStack() as stack:
@@ -39,7 +41,8 @@ def test_failure_names_the_node_and_its_last_words(tmp_path: Path):
 def test_node_that_does_not_end_is_killed(tmp_path: Path, monkeypatch):
     monkeypatch.setattr(processes, '_STOP_SECONDS', 0.2)
     (tmp_path / 'stubborn.py').write_text(
-        'import signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN); time.sleep(60)')
+        'import signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN); time.sleep(60)'
+    )
     node = NodeProcess('stubborn', 'stubborn', [], {'PYTHONPATH': str(tmp_path)}, tmp_path / 'log')
     node.interrupt()
     node.wait()

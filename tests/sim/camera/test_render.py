@@ -36,8 +36,13 @@ def sample(psi1: float = -0.2, psi2: float = 0.1, rate: float = 0.0, stamp_ns: i
 
 
 @cache
-def make(view: ViewParams = VIEWS['face-on'], look: LookParams = SHARP, tags: TagParams = TAGS, colour: bool = False,
-         scene: SceneParams = SCENE) -> Renderer:
+def make(
+    view: ViewParams = VIEWS['face-on'],
+    look: LookParams = SHARP,
+    tags: TagParams = TAGS,
+    colour: bool = False,
+    scene: SceneParams = SCENE,
+) -> Renderer:
     return Renderer(scene, view, look, tags, view.make_camera(), colour)
 
 
@@ -54,8 +59,14 @@ def detect(image: Any) -> dict[int, Floats]:
         parameters = cv2.aruco.DetectorParameters_create()
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_CONTOUR
         found, ids, _ = cv2.aruco.detectMarkers(image, dictionary, parameters=parameters)
-    return {} if ids is None else {int(tag): grown(np.roll(corner[0], 2, axis=0).astype(float))
-                                   for tag, corner in zip(np.ravel(ids), found, strict=True)}
+    return (
+        {}
+        if ids is None
+        else {
+            int(tag): grown(np.roll(corner[0], 2, axis=0).astype(float))
+            for tag, corner in zip(np.ravel(ids), found, strict=True)
+        }
+    )
 
 
 def grown(corner: Floats) -> Floats:
@@ -153,8 +164,11 @@ def test_following_keeps_the_pair_in_the_middle():
 
 
 def test_several_tags_on_a_wheel_are_all_drawn():
-    tags = TagParams(size=0.12, front=TagGroup((3, 4), (0.0, 90.0), (0.0, 0.3), (0.0, 0.1)),
-                     rear=TagGroup((5,), (45.0,), (0.0,), (0.2,)))
+    tags = TagParams(
+        size=0.12,
+        front=TagGroup((3, 4), (0.0, 90.0), (0.0, 0.3), (0.0, 0.1)),
+        rear=TagGroup((5,), (45.0,), (0.0,), (0.2,)),
+    )
     renderer, joints = make(tags=tags), sample()
     footing = Footing(SCENE, joints)
     truth, found = renderer.tag_pixels(footing, joints), detect(renderer.draw(footing, joints))
@@ -167,8 +181,9 @@ def test_exposure_smears_along_the_motion_and_keeps_the_middle():
     renderer = make(look=SHARP._replace(exposure=0.03))
     footing = Footing(SCENE, sample())
     sharp, smeared = (renderer.draw(footing, sample(rate=rate)).astype(float) for rate in (0.0, 2.0))
-    turns = [renderer.draw(footing, sample(-0.2 + turn, 0.1 + turn)).astype(float)
-             for turn in np.linspace(-0.03, 0.03, 31)]
+    turns = [
+        renderer.draw(footing, sample(-0.2 + turn, 0.1 + turn)).astype(float) for turn in np.linspace(-0.03, 0.03, 31)
+    ]
     assert float(np.abs(smeared - np.mean(turns, axis=0)).mean()) < 0.2 * float(np.abs(smeared - sharp).mean())
     found, truth = detect(smeared.astype(np.uint8)), renderer.tag_pixels(footing, sample())
     for tag, corner in truth.items():
@@ -230,18 +245,36 @@ def test_small_and_large_rigs_look_alike():
     rig = RigParams()
     small = SceneParams(*(shape._replace(length=0.1) for shape in SCENE.wheels))
     tags = TAGS._replace(size=TAGS.size * 0.1 / rig.front.length)
-    one, other = (make(SMALL, scene=scene, tags=tag).draw(Footing(scene, sample()), sample()).astype(int)
-                  for scene, tag in ((SCENE, TAGS), (small, tags)))
+    one, other = (
+        make(SMALL, scene=scene, tags=tag).draw(Footing(scene, sample()), sample()).astype(int)
+        for scene, tag in ((SCENE, TAGS), (small, tags))
+    )
     assert float((np.abs(one - other) > 3).mean()) < 0.001
 
 
-@pytest.mark.parametrize('odd', [{'distance': 0.3}, {'distance': 0.05}, {'pan_deg': 75.0}, {'tilt_deg': 80.0},
-                                 {'follow': False, 'place': 500.0}, {'roll_deg': 180.0}, {'image_width': 16},
-                                 {'field_of_view_deg': 120.0, 'k1': -0.3}], ids=str)
+@pytest.mark.parametrize(
+    'odd',
+    [
+        {'distance': 0.3},
+        {'distance': 0.05},
+        {'pan_deg': 75.0},
+        {'tilt_deg': 80.0},
+        {'follow': False, 'place': 500.0},
+        {'roll_deg': 180.0},
+        {'image_width': 16},
+        {'field_of_view_deg': 120.0, 'k1': -0.3},
+    ],
+    ids=str,
+)
 def test_odd_views_are_drawn_without_complaint(odd):
     view = SMALL._replace(**odd)
     renderer = make(view, LookParams())
-    for joints in (sample(rate=1.0), sample(1e9, -1e9, 100.0), sample(rate=math.nan), sample(rate=-1e308),
-                   sample()._replace(coupler=CouplerSample(1e300))):
+    for joints in (
+        sample(rate=1.0),
+        sample(1e9, -1e9, 100.0),
+        sample(rate=math.nan),
+        sample(rate=-1e308),
+        sample()._replace(coupler=CouplerSample(1e300)),
+    ):
         image = renderer.draw(Footing(SCENE, joints), joints, 3.0)
         assert image.shape == (view.image_height, view.image_width)

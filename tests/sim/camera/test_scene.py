@@ -38,7 +38,8 @@ def test_hubs_are_as_far_apart_as_in_the_simulation(start, told):
         sample = source.read(t, 0)
         front, rear = footing.places(sample.front.angle, sample.rear.angle)
         assert math.hypot(front.along - rear.along, front.above - rear.above) == pytest.approx(
-            sample.coupler.length, abs=1e-9)
+            sample.coupler.length, abs=1e-9
+        )
 
 
 def test_a_camera_that_joins_later_sees_the_same_pair():
@@ -76,8 +77,10 @@ def test_downhill_is_left_and_rolling_downhill_turns_counter_clockwise():
     assert downhill[0] < here[0] < uphill[0]
     assert downhill[1] > here[1] > uphill[1], 'the slope falls'
     hub = np.array((0.0, SCENE.tag_plane, 1.0))
-    spoke = [np.subtract(*pixels(SCENE, ViewParams(), [WheelPlace(0.0, 1.0, psi).points((0.0, 0.3), hub[1]), hub]))
-             for psi in (0.0, 0.4)]
+    spoke = [
+        np.subtract(*pixels(SCENE, ViewParams(), [WheelPlace(0.0, 1.0, psi).points((0.0, 0.3), hub[1]), hub]))
+        for psi in (0.0, 0.4)
+    ]
     angles = [math.atan2(-y, x) for x, y in spoke]
     assert angles[1] - angles[0] == pytest.approx(0.4, abs=1e-9)
 

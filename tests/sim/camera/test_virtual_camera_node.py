@@ -19,6 +19,8 @@ from dcdrw_sim.camera.render import LookParams, Renderer
 from dcdrw_sim.camera.scene import Footing, SceneParams, ViewParams
 from tests import ROOT
 
+pytestmark = pytest.mark.processes
+
 pytest.importorskip('cv2')
 SMALL = {'image_width': 320, 'image_height': 180}
 SECOND = 1_000_000_000
@@ -58,6 +60,7 @@ class Film:
         def rolled():
             self.roll()
             return condition()
+
         return self.bench.wait(rolled, what)
 
 
@@ -128,12 +131,15 @@ def test_view_and_light_change_while_it_runs_and_impossible_ones_are_refused(ben
     assert film.process.poll() is None
 
 
-@pytest.mark.parametrize(('parameters', 'message'), [
-    ({'encoding': 'rgb8'}, 'encoding must be mono8 or bgr8'),
-    ({'camera': '/no/such/camera.yaml'}, '/no/such/camera.yaml'),
-    ({'family': '99h9'}, 'family must be one of'),
-    ({'occlude': 'left'}, 'occlude must be'),
-])
+@pytest.mark.parametrize(
+    ('parameters', 'message'),
+    [
+        ({'encoding': 'rgb8'}, 'encoding must be mono8 or bgr8'),
+        ({'camera': '/no/such/camera.yaml'}, '/no/such/camera.yaml'),
+        ({'family': '99h9'}, 'family must be one of'),
+        ({'occlude': 'left'}, 'occlude must be'),
+    ],
+)
 def test_impossible_parameters_end_it_with_one_line(bench, parameters, message):
     process = bench.start('virtual_camera', **parameters)
     assert process.wait(20.0) == 2
@@ -145,9 +151,18 @@ def test_impossible_parameters_end_it_with_one_line(bench, parameters, message):
 
 def test_without_opencv_it_says_what_to_install(bench, tmp_path):
     (tmp_path / 'cv2.py').write_text("raise ImportError('hidden')\n")
-    done = subprocess.run([sys.executable, '-m', 'dcdrw_sim.camera.virtual_camera_node'], capture_output=True, text=True,
-                          check=False, cwd=ROOT, timeout=60.0,
-                          env={**os.environ, 'PYTHONPATH': f'{tmp_path}:{os.environ.get("PYTHONPATH", "")}',
-                               'ROS_DOMAIN_ID': str(bench.domain)})
+    done = subprocess.run(
+        [sys.executable, '-m', 'dcdrw_sim.camera.virtual_camera_node'],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=ROOT,
+        timeout=60.0,
+        env={
+            **os.environ,
+            'PYTHONPATH': f'{tmp_path}:{os.environ.get("PYTHONPATH", "")}',
+            'ROS_DOMAIN_ID': str(bench.domain),
+        },
+    )
     assert done.returncode == 2
     assert 'pictures need OpenCV' in done.stderr

@@ -78,14 +78,16 @@ def test_energy_per_metre_is_that_of_the_slope_beside_it(axes):
     figures.draw_energy(axes, PAPER, points=5)
     _, cost = line(axes, 'rigid bar')
     velocity = RigidPair(PAPER, 0.5).gait().velocity
-    assert cost[1] == pytest.approx(energy_per_metre(PAPER._replace(
-        slope=slope_for_velocity(PAPER, 0.25, velocity))), rel=1e-4)
+    assert cost[1] == pytest.approx(
+        energy_per_metre(PAPER._replace(slope=slope_for_velocity(PAPER, 0.25, velocity))), rel=1e-4
+    )
     assert np.argmin(cost) == 2
     [slope] = axes.child_axes
     axes.figure.draw_without_rendering()
     low, high = axes.get_ylim()
     assert slope.get_ylim() == pytest.approx(
-        [math.degrees(math.asin(value / (20.0 * GRAVITY))) for value in (low, high)])
+        [math.degrees(math.asin(value / (20.0 * GRAVITY))) for value in (low, high)]
+    )
 
 
 def test_energy_on_too_gentle_a_slope_is_refused(axes):

@@ -73,6 +73,7 @@ def test_all_valid_motions_are_drawn(axes, dataset):
 
 def test_raw_eigenvalues_are_all_one_and_multipliers_are_not(axes, dataset):
     from matplotlib.colors import Normalize
+
     for name, low, high in (('raw_eigenvalues', 0.99999, 1.00001), ('multipliers', 0.7, 0.96)):
         mesh = sweep_figures.draw_eigenvalues(axes, dataset, name, Normalize(0.7, 1.0))
         shown = mesh.get_array().compressed()
@@ -131,8 +132,9 @@ def test_map_over_couplers_has_the_edges_of_the_stall_band(axes, dataset):
 
 def test_map_over_slopes_has_the_gentlest_slopes(axes, tmp_path):
     path = tmp_path / 'slopes.nc'
-    sweep = SWEEP._replace(x=Axis('slope_deg', (1.2, 1.6, 2.4)), y=Axis('b', (0.05, 1.0, 8.0)), seconds=300.0,
-                           trajectories=False)
+    sweep = SWEEP._replace(
+        x=Axis('slope_deg', (1.2, 1.6, 2.4)), y=Axis('b', (0.05, 1.0, 8.0)), seconds=300.0, trajectories=False
+    )
     with ThreadPoolExecutor(2) as executor:
         run_sweep(sweep, path, executor, 3)
     with open_sweep(path) as slopes:

@@ -18,15 +18,22 @@ from tests.sim.rigs import UNCOUPLED, between
 
 SWEEP = preset('paper-sweep').resolved()
 SIN = math.sin(math.pi / 12)
-TABLE = np.array([  # contract §3: D0, k̂, b̂, θ2* [deg], moduli
-    (1.0, 1e-4, 0.15, -0.615, 0.9477, 0.7826, 0.394),
-    (1.0, 1e-3, 0.3, -0.128, 0.9166, 0.8298, 0.1845),
-    (1.0 + SIN, 5e-3, 0.15, -0.863, 0.8911, 0.7829, 0.4188),
-    (1.0 + SIN, 1e-2, 0.2, -0.933, 0.8450, 0.7976, 0.3429),
-    (1.0 + SIN, 1e-3, 3.0, -0.971, 0.9481, 0.8078, 0.000),
-])
-MIXED = RigParams(WheelParams(0.95, 9.0, 12), WheelParams(0.95 * SIN / math.sin(math.pi / 13), 11.0, 13), k=20.0,
-                  b=30.0, slope=math.radians(2.5))
+TABLE = np.array(
+    [  # contract §3: D0, k̂, b̂, θ2* [deg], moduli
+        (1.0, 1e-4, 0.15, -0.615, 0.9477, 0.7826, 0.394),
+        (1.0, 1e-3, 0.3, -0.128, 0.9166, 0.8298, 0.1845),
+        (1.0 + SIN, 5e-3, 0.15, -0.863, 0.8911, 0.7829, 0.4188),
+        (1.0 + SIN, 1e-2, 0.2, -0.933, 0.8450, 0.7976, 0.3429),
+        (1.0 + SIN, 1e-3, 3.0, -0.971, 0.9481, 0.8078, 0.000),
+    ]
+)
+MIXED = RigParams(
+    WheelParams(0.95, 9.0, 12),
+    WheelParams(0.95 * SIN / math.sin(math.pi / 13), 11.0, 13),
+    k=20.0,
+    b=30.0,
+    slope=math.radians(2.5),
+)
 
 
 def cycles_of(rig, phase=0.5, **columns):
@@ -39,14 +46,17 @@ def damper_loss(rig, state):
     """What the damper takes in a step, by integration along the motion [J]."""
     motion, total = run(rig, State(rig.front.alpha, *state), strikes=3), 0.0
     for segment in motion.segments:
+
         def power(time, segment=segment):
             at = State(*map(float, segment.at(time)))
             return damper_power(rig, coupler(rig, at, stance_distance(rig, *segment.steps)).rate)
+
         total += quad(power, segment.start, segment.end, epsabs=1e-14, epsrel=1e-12)[0]
     return total
 
 
 # Agreement with the scalar map
+
 
 def test_the_contract_s_table():
     D0, k, b, theta2_deg = TABLE[:, :4].T
@@ -84,9 +94,9 @@ def test_a_pair_s_cycle_does_not_depend_on_the_others():
     b = np.linspace(0.05, 0.35, 9)
     _, together = cycles_of(SWEEP, b=b)
     for index in range(9):
-        _, alone = cycles_of(SWEEP, b=b[index:index + 1])
+        _, alone = cycles_of(SWEEP, b=b[index : index + 1])
         for whole, one in zip(together, alone, strict=True):
-            assert whole[index:index + 1].tobytes() == one.tobytes()
+            assert whole[index : index + 1].tobytes() == one.tobytes()
 
 
 def test_there_is_none_in_the_stall_nor_of_unequal_steps_nor_from_nowhere():
@@ -111,6 +121,7 @@ def test_uncoupled_wheels_keep_every_phase():
 
 # Speed and energy
 
+
 @pytest.mark.parametrize('rig', [RigParams(), MIXED, SWEEP, SWEEP._replace(b=3.0, k=1e-3)])
 def test_strikes_and_damper_take_what_the_slope_gives(rig):
     rigs, cycles = cycles_of(rig)
@@ -125,8 +136,12 @@ def test_strikes_and_damper_take_what_the_slope_gives(rig):
 def test_uncoupled_wheels_walk_as_mcgeer_s():
     rigs, cycles = cycles_of(UNCOUPLED)
     wheel, walking = UNCOUPLED.front, losses(rigs, cycles)
-    period = quad(lambda theta: 1.0 / limit_cycle_speed(wheel, UNCOUPLED.slope, UNCOUPLED.gravity, theta),
-                  -wheel.alpha, wheel.alpha, epsabs=1e-13)[0]
+    period = quad(
+        lambda theta: 1.0 / limit_cycle_speed(wheel, UNCOUPLED.slope, UNCOUPLED.gravity, theta),
+        -wheel.alpha,
+        wheel.alpha,
+        epsabs=1e-13,
+    )[0]
     assert walking.speed[0] == pytest.approx(wheel.step_length / period, rel=1e-10)
     after = limit_cycle_speed(wheel, UNCOUPLED.slope, UNCOUPLED.gravity)
     lost = kinetic_energy(wheel, after / math.cos(2 * wheel.alpha)) - kinetic_energy(wheel, after)

@@ -17,6 +17,7 @@ NEAR = [MAP.iterate(SectionState(*(np.array(FIXED.state) + kick).tolist()), 6) f
 
 # The paper's defect (erratum 5)
 
+
 @pytest.mark.parametrize(('k', 'b'), [(5e-3, 0.15), (1e-2, 0.2), (1e-3, 3.0)])
 def test_raw_has_an_eigenvalue_1_whatever_the_coupler(k, b):
     return_map = ReturnMap(preset('paper-sweep')._replace(k=k, b=b))
@@ -44,6 +45,7 @@ def test_data_at_rest_on_the_fixed_point_give_that_eigenvalue_alone():
 
 # The corrected form
 
+
 def test_affine_gives_the_exact_multipliers_for_small_deviations():
     for fit in (fit_affine(NEAR), fit_affine(NEAR, FIXED.state)):
         assert fit.rank == 3
@@ -59,6 +61,7 @@ def test_the_section_has_three_independent_coordinates():  # erratum 4
 
 
 # Least squares
+
 
 def test_raw_is_the_papers_a_equal_to_b_p():
     trials = [MAP.raw(MAP.iterate(MAP.at_phase(phase), 20)) for phase in (0.3, 0.6, 0.8)]
@@ -100,8 +103,11 @@ def test_nothing_to_fit_is_told(trajectories):
 
 # Steps
 
-@pytest.mark.parametrize(('values', 'steps'), [
-    ([5, 3, 0.5, 3, 0.9, -0.9], 4), ([0.0, 0.1], 0), ([5, 3, 2], None), ([0, 0, 2], None), ([5, 0], 1), ([], None)])
+
+@pytest.mark.parametrize(
+    ('values', 'steps'),
+    [([5, 3, 0.5, 3, 0.9, -0.9], 4), ([0.0, 0.1], 0), ([5, 3, 2], None), ([0, 0, 2], None), ([5, 0], 1), ([], None)],
+)
 def test_steps_count_until_the_values_stay(values, steps):
     assert steps_to_stay([10 + value for value in values], 10, 1.0) == steps
 

@@ -23,8 +23,13 @@ TABLE = [  # contract §3: D0, k̂, b̂, θ2* [deg], moduli
     (1.0 + SIN, 1e-3, 3.0, -0.971, (0.9481, 0.8078, 0.000)),
 ]
 # Wheels unlike in all but the length of their steps.
-MIXED = RigParams(WheelParams(0.95, 9.0, 12), WheelParams(0.95 * SIN / math.sin(math.pi / 13), 11.0, 13), k=20.0,
-                  b=30.0, slope=math.radians(2.5))
+MIXED = RigParams(
+    WheelParams(0.95, 9.0, 12),
+    WheelParams(0.95 * SIN / math.sin(math.pi / 13), 11.0, 13),
+    k=20.0,
+    b=30.0,
+    slope=math.radians(2.5),
+)
 STIFF = RigParams(k=300.0, b=2000.0, slope=math.radians(4.0))
 BEHIND = RigParams(S0=-1.2, D0=1.2, k=30.0)
 
@@ -36,12 +41,19 @@ def sweep_map(D0, k, b):
 def differences(return_map, state, h=1e-5):
     """The derivative of the map by central differences."""
     state = np.array(state)
-    columns = [np.subtract(return_map.step(SectionState(*(state + h * axis).tolist())),
-                           return_map.step(SectionState(*(state - h * axis).tolist()))) / (2 * h) for axis in np.eye(3)]
+    columns = [
+        np.subtract(
+            return_map.step(SectionState(*(state + h * axis).tolist())),
+            return_map.step(SectionState(*(state - h * axis).tolist())),
+        )
+        / (2 * h)
+        for axis in np.eye(3)
+    ]
     return np.array(columns).T
 
 
 # The contract
+
 
 @pytest.mark.parametrize(('D0', 'k', 'b', 'theta2_deg', 'moduli'), TABLE)
 def test_fixed_points_and_multipliers_are_those_of_the_contract(D0, k, b, theta2_deg, moduli):
@@ -55,6 +67,7 @@ def test_fixed_points_and_multipliers_are_those_of_the_contract(D0, k, b, theta2
 
 
 # The step
+
 
 @pytest.mark.parametrize('rig', [RigParams(), MIXED, BEHIND])
 def test_a_step_is_that_of_an_independent_integration(rig):
@@ -92,11 +105,14 @@ def test_the_fourth_raw_state_is_the_length_of_the_coupler():
 
 # The derivative
 
+
 @given(rigs, starts)
 def test_jacobian_is_that_of_the_papers_equations(rig, start):
     rig, state, h = rig.resolved(), np.array(rolling(rig, *start)), 1e-6
-    columns = [(paper_rates(rig, rig.S0, state + h * axis) - paper_rates(rig, rig.S0, state - h * axis)) / (2 * h)
-               for axis in np.eye(4)]
+    columns = [
+        (paper_rates(rig, rig.S0, state + h * axis) - paper_rates(rig, rig.S0, state - h * axis)) / (2 * h)
+        for axis in np.eye(4)
+    ]
     exact = jacobian(rig, State(*state), rig.S0)
     assert exact == pytest.approx(np.array(columns).T, rel=1e-6, abs=1e-6)
 
@@ -164,6 +180,7 @@ def test_multipliers_are_sorted_by_modulus():
 
 # The fixed point
 
+
 @pytest.mark.parametrize('row', [1, 2, 4])
 def test_every_start_leads_to_the_limit_cycle(row):
     return_map = sweep_map(*TABLE[row][:3])
@@ -186,12 +203,16 @@ def test_where_the_damper_takes_more_than_the_slope_gives_there_is_no_fixed_poin
 
 # Motions that do not return
 
-@pytest.mark.parametrize(('state', 'message'), [
-    (SectionState(1.1, 0.1, 6.0), r'the front wheel slipped a step \(n = -1 at the section\)'),
-    (SectionState(3.5, -0.2, 1.0), r'the rear wheel slipped a step \(n = 1 at the section\)'),
-    (SectionState(0.1, -0.2, 0.8), 'the front wheel did not pass its apex and rocked back'),
-    (SectionState(1.1, -0.2, -0.5), 'the rear wheel did not pass its apex and rocked back'),
-])
+
+@pytest.mark.parametrize(
+    ('state', 'message'),
+    [
+        (SectionState(1.1, 0.1, 6.0), r'the front wheel slipped a step \(n = -1 at the section\)'),
+        (SectionState(3.5, -0.2, 1.0), r'the rear wheel slipped a step \(n = 1 at the section\)'),
+        (SectionState(0.1, -0.2, 0.8), 'the front wheel did not pass its apex and rocked back'),
+        (SectionState(1.1, -0.2, -0.5), 'the rear wheel did not pass its apex and rocked back'),
+    ],
+)
 def test_a_step_that_does_not_return_says_why(state, message):
     with pytest.raises(NoReturnError, match=f'does not come back to the section: .*{message}'):
         ReturnMap(RigParams()).step(state)
@@ -204,12 +225,15 @@ def test_a_wheel_that_stands_and_hubs_that_meet_end_the_step():
         ReturnMap(UNCOUPLED._replace(S0=-UNCOUPLED.front.step_length)).step(SectionState(1.2, -0.25, 0.9))
 
 
-@pytest.mark.parametrize(('state', 'message'), [
-    (SectionState(0.0, 0.1, 1.0), 'omega1 at the section must be > 0, got 0'),
-    (SectionState(math.nan, 0.1, 1.0), 'omega1 at the section must be > 0, got nan'),
-    (SectionState(1.0, 0.5, 1.0), 'theta2 of the start must be within'),
-    (SectionState(1.0, 0.1, math.inf), 'omega2 of the start must be finite'),
-])
+@pytest.mark.parametrize(
+    ('state', 'message'),
+    [
+        (SectionState(0.0, 0.1, 1.0), 'omega1 at the section must be > 0, got 0'),
+        (SectionState(math.nan, 0.1, 1.0), 'omega1 at the section must be > 0, got nan'),
+        (SectionState(1.0, 0.5, 1.0), 'theta2 of the start must be within'),
+        (SectionState(1.0, 0.1, math.inf), 'omega2 of the start must be finite'),
+    ],
+)
 def test_what_is_not_on_the_section_is_refused(state, message):
     for use in (ReturnMap(RigParams()).step, ReturnMap(RigParams()).fixed_point):
         with pytest.raises(ValueError, match=message):

@@ -51,8 +51,11 @@ def test_coupler_spans_the_hubs(rig, start, S):
 def test_arrays_and_numbers_agree(rig, start):
     state = rolling(rig, *start)
     columns = State(*(np.full(3, value) for value in state))
-    for of_numbers, of_arrays in zip((*coupler(rig, state, 1.0), *accelerations(rig, state, 1.0)),
-                                     (*coupler(rig, columns, 1.0), *accelerations(rig, columns, 1.0)), strict=True):
+    for of_numbers, of_arrays in zip(
+        (*coupler(rig, state, 1.0), *accelerations(rig, state, 1.0)),
+        (*coupler(rig, columns, 1.0), *accelerations(rig, columns, 1.0)),
+        strict=True,
+    ):
         assert of_arrays == pytest.approx([of_numbers] * 3, rel=1e-12, abs=1e-12)
 
 

@@ -49,10 +49,12 @@ def test_energy_and_acceleration_scale(rig, start):
     state = rolling(rig, *start)
     reduced, scales = nondimensional(rig)
     assert mechanical_energy(reduced, scales.reduce(state), 1, 0) * scales.energy == pytest.approx(
-        mechanical_energy(rig, state, 1, 0), rel=1e-12, abs=1e-12 * scales.energy)
+        mechanical_energy(rig, state, 1, 0), rel=1e-12, abs=1e-12 * scales.energy
+    )
     of_reduced = accelerations(reduced, scales.reduce(state), reduced.S0, 3.0 / scales.force)
     assert [a / scales.time**2 for a in of_reduced] == pytest.approx(
-        accelerations(rig, state, rig.S0, 3.0), rel=1e-9, abs=1e-9)
+        accelerations(rig, state, rig.S0, 3.0), rel=1e-9, abs=1e-9
+    )
 
 
 @given(rigs, starts, scales_)

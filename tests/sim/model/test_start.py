@@ -46,8 +46,11 @@ def test_a_phase_out_of_range_is_refused(initial_phase):
 
 @pytest.mark.parametrize('initial_phase', [0.0, 0.1, 0.9])
 def test_too_gentle_a_slope_is_refused_with_the_slope_and_the_mend(initial_phase):
-    with pytest.raises(ValueError, match=r'slope 0\.0174533 rad \(1°\) is too gentle for the front wheel.*'
-                                         r'steeper than 0\.0189039 rad \(1\.083°\), or give the angles and speeds'):
+    with pytest.raises(
+        ValueError,
+        match=r'slope 0\.0174533 rad \(1°\) is too gentle for the front wheel.*'
+        r'steeper than 0\.0189039 rad \(1\.083°\), or give the angles and speeds',
+    ):
         start_state(RigParams(slope=math.radians(1.0)), initial_phase)
 
 

@@ -22,8 +22,12 @@ def read(tmp_path, content):
 def test_the_reference_is_read_as_it_stands():
     cases, is_list = read_cases(REFERENCE)
     assert is_list
-    assert [case.name for case in cases] == ['paper_rig', 'paper_sweep_low_damping', 'paper_sweep_high_damping',
-                                             'unequal_wheels']
+    assert [case.name for case in cases] == [
+        'paper_rig',
+        'paper_sweep_low_damping',
+        'paper_sweep_high_damping',
+        'unequal_wheels',
+    ]
     unequal = cases[3]
     assert (unequal.rig.front.length, unequal.rig.rear.mass, unequal.rig.b) == (0.95, 11.0, 30.0)
     assert unequal.rig.rear.alpha == pytest.approx(unequal.raw['alpha'][1], rel=1e-15)
@@ -60,33 +64,36 @@ def test_the_record_of_a_run_that_ended_early_names_the_wheel(tmp_path):
 WITHOUT_K = {key: value for key, value in CASE.items() if key != 'k'}
 
 
-@pytest.mark.parametrize(('content', 'message'), [
-    ('', r'case\.json is not JSON: '),
-    ('{"g": 9.81', r'case\.json is not JSON: '),
-    ('[' * 100_000, r'case\.json is not JSON: '),
-    ([], r'case\.json holds no case: the list is empty'),
-    ('3', r'case\.json, case 0: must be an object with the keys g, slope, k, b, D0, S0, l, m, alpha, x0'),
-    ([CASE, None], r'case 1: must be an object'),
-    ({'case': 3}, r'case 0: must be an object'),
-    (WITHOUT_K, r'case 0 \(paper_rig\): k is missing'),
-    ([CASE, WITHOUT_K], r'case 1 \(paper_rig\): k is missing'),
-    (CASE | {'k': math.nan}, 'k must be a finite number, got nan'),
-    (CASE | {'b': math.inf}, 'b must be a finite number, got inf'),
-    (CASE | {'b': 10**400}, 'b must be a finite number, got 1000'),
-    (CASE | {'g': '9.81'}, "g must be a finite number, got '9.81'"),
-    (CASE | {'g': True}, 'g must be a finite number, got True'),
-    (CASE | {'g': None}, 'g must be a finite number, got None'),
-    (CASE | {'l': 1.0}, r'l must be 2 finite numbers, got 1\.0'),
-    (CASE | {'m': [1.0, 2.0, 3.0]}, r'm must be 2 finite numbers, got \[1\.0, 2\.0, 3\.0\]'),
-    (CASE | {'x0': [0.0, 1.0, 0.0]}, r'x0 must be 4 finite numbers, got \[0\.0, 1\.0, 0\.0\]'),
-    (CASE | {'x0': [0.0, math.nan, 0.0, 1.0]}, 'x0 must be 4 finite numbers'),
-    (CASE | {'x0': [0.5, 1.0, 0.0, 1.0]}, r'case 0 \(paper_rig\): theta1 of the start must be within ±α'),
-    (CASE | {'alpha': [0.0, 0.2]}, r'alpha must be in \(0, π/4\] rad, got 0\.0'),
-    (CASE | {'alpha': [0.2, 1.0]}, r'alpha must be in \(0, π/4\] rad, got 1\.0'),
-    (CASE | {'l': [1.0, -1.0]}, r'case 0 \(paper_rig\): rear\.length must be > 0 m, got -1\.0'),
-    (CASE | {'k': -1}, 'k must be ≥ 0 N/m'),
-    (CASE | {'S0': 0.0, 'x0': [0.1, 1.0, 0.1, 1.0]}, 'the hubs met'),
-])
+@pytest.mark.parametrize(
+    ('content', 'message'),
+    [
+        ('', r'case\.json is not JSON: '),
+        ('{"g": 9.81', r'case\.json is not JSON: '),
+        ('[' * 100_000, r'case\.json is not JSON: '),
+        ([], r'case\.json holds no case: the list is empty'),
+        ('3', r'case\.json, case 0: must be an object with the keys g, slope, k, b, D0, S0, l, m, alpha, x0'),
+        ([CASE, None], r'case 1: must be an object'),
+        ({'case': 3}, r'case 0: must be an object'),
+        (WITHOUT_K, r'case 0 \(paper_rig\): k is missing'),
+        ([CASE, WITHOUT_K], r'case 1 \(paper_rig\): k is missing'),
+        (CASE | {'k': math.nan}, 'k must be a finite number, got nan'),
+        (CASE | {'b': math.inf}, 'b must be a finite number, got inf'),
+        (CASE | {'b': 10**400}, 'b must be a finite number, got 1000'),
+        (CASE | {'g': '9.81'}, "g must be a finite number, got '9.81'"),
+        (CASE | {'g': True}, 'g must be a finite number, got True'),
+        (CASE | {'g': None}, 'g must be a finite number, got None'),
+        (CASE | {'l': 1.0}, r'l must be 2 finite numbers, got 1\.0'),
+        (CASE | {'m': [1.0, 2.0, 3.0]}, r'm must be 2 finite numbers, got \[1\.0, 2\.0, 3\.0\]'),
+        (CASE | {'x0': [0.0, 1.0, 0.0]}, r'x0 must be 4 finite numbers, got \[0\.0, 1\.0, 0\.0\]'),
+        (CASE | {'x0': [0.0, math.nan, 0.0, 1.0]}, 'x0 must be 4 finite numbers'),
+        (CASE | {'x0': [0.5, 1.0, 0.0, 1.0]}, r'case 0 \(paper_rig\): theta1 of the start must be within ±α'),
+        (CASE | {'alpha': [0.0, 0.2]}, r'alpha must be in \(0, π/4\] rad, got 0\.0'),
+        (CASE | {'alpha': [0.2, 1.0]}, r'alpha must be in \(0, π/4\] rad, got 1\.0'),
+        (CASE | {'l': [1.0, -1.0]}, r'case 0 \(paper_rig\): rear\.length must be > 0 m, got -1\.0'),
+        (CASE | {'k': -1}, 'k must be ≥ 0 N/m'),
+        (CASE | {'S0': 0.0, 'x0': [0.1, 1.0, 0.1, 1.0]}, 'the hubs met'),
+    ],
+)
 def test_a_bad_file_is_refused_with_what_is_wrong_in_it(tmp_path, content, message):
     with pytest.raises(ValueError, match=message) as error:
         read(tmp_path, content)

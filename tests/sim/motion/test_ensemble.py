@@ -28,13 +28,19 @@ def sweep(count=60, seed=1):
     rng = np.random.default_rng(seed)
     theta2 = rng.uniform(-0.9, 0.9, count) * SWEEP.front.alpha
     speed = limit_cycle_speed(SWEEP.front, SWEEP.slope, 1.0)
-    states = np.column_stack([np.full(count, -SWEEP.front.alpha), np.full(count, speed), theta2,
-                              limit_cycle_speed(SWEEP.front, SWEEP.slope, 1.0, theta2)])
+    states = np.column_stack(
+        [
+            np.full(count, -SWEEP.front.alpha),
+            np.full(count, speed),
+            theta2,
+            limit_cycle_speed(SWEEP.front, SWEEP.slope, 1.0, theta2),
+        ]
+    )
     return states, {'k': 10.0 ** rng.uniform(-4, -2, count), 'b': 10.0 ** rng.uniform(-1, 1, count)}
 
 
 def strikes(ensemble, index):
-    return ensemble.strikes[index, :ensemble.counts[index]]
+    return ensemble.strikes[index, : ensemble.counts[index]]
 
 
 def assert_agrees(ensemble, index, run, time=1e-9, state=1e-8):
@@ -47,6 +53,7 @@ def assert_agrees(ensemble, index, run, time=1e-9, state=1e-8):
 
 
 # What a pair does
+
 
 @few
 @given(rigs, st.lists(starts, min_size=1, max_size=4))
@@ -73,8 +80,10 @@ def test_the_paper_s_sweep_agrees_for_a_hundred_time_units():
     assert {End.TIME, End.STANDING} <= {*ensemble.ends}
 
 
-@pytest.mark.parametrize(('column', 'low', 'high'), [
-    ('k', 0.0, 40.0), ('b', 0.0, 150.0), ('D0', 0.5, 1.5), ('S0', 0.8, 1.4), ('slope', 0.05, 0.1)])
+@pytest.mark.parametrize(
+    ('column', 'low', 'high'),
+    [('k', 0.0, 40.0), ('b', 0.0, 150.0), ('D0', 0.5, 1.5), ('S0', 0.8, 1.4), ('slope', 0.05, 0.1)],
+)
 def test_a_column_is_a_parameter_of_its_pair(column, low, high):
     values, state = np.linspace(low, high, 5), State(-0.2, 1.3, 0.1, 1.4)
     ensemble = run_ensemble(UNEQUAL, [state] * 5, 4.0, 40, **{column: values})
@@ -89,12 +98,15 @@ def test_a_column_of_one_number_is_of_all_pairs():
 
 
 def test_the_length_at_rest_follows_the_stance_distance_of_its_pair():
-    given_, derived = (run_ensemble(UNEQUAL, [(-0.2, 1.3, 0.1, 1.4)] * 2, 4.0, 40, S0=[0.9, 1.3], **more) for more in (
-        {'D0': np.array([0.9, 1.3]) + UNEQUAL.front.length * math.sin(UNEQUAL.front.alpha)}, {}))
+    given_, derived = (
+        run_ensemble(UNEQUAL, [(-0.2, 1.3, 0.1, 1.4)] * 2, 4.0, 40, S0=[0.9, 1.3], **more)
+        for more in ({'D0': np.array([0.9, 1.3]) + UNEQUAL.front.length * math.sin(UNEQUAL.front.alpha)}, {})
+    )
     assert np.array_equal(given_.strikes, derived.strikes)
 
 
 # Lanes
+
 
 @pytest.mark.parametrize('seed', [1, 2])
 def test_a_pair_s_result_depends_neither_on_its_lane_nor_on_its_neighbours(seed):
@@ -128,6 +140,7 @@ def test_two_wheels_that_strike_at_one_instant_both_strike():
 
 # Ends
 
+
 def test_time_ends_a_pair():
     ensemble = run_ensemble(UNEQUAL, [(-0.2, 1.3, 0.1, 1.4)], 4.0, 40)
     assert (ensemble.ends[0], ensemble.durations[0]) == (End.TIME, 4.0)
@@ -146,13 +159,16 @@ def test_a_pair_with_as_many_strikes_as_there_is_room_for_ends(capacity):
 FRONT_TOO_SLOW = State(-0.2, 0.1, 0.1, 1.4)
 
 
-@pytest.mark.parametrize(('rig', 'state', 'end'), [
-    (GENTLE, FRONT_TOO_SLOW, End.STANDING),
-    (UNCOUPLED, State(-ALPHA, 0.0, -ALPHA, 0.0), End.STANDING),
-    (UNCOUPLED, State(-0.1, -1.5, 0.1, 1.4), End.FALLEN),
-    (UNCOUPLED._replace(slope=0.0), State(0.0, 0.0, 0.0, 0.0), End.STALLED),
-    (UNCOUPLED._replace(S0=1e-9), State(0.0, 1.0, 0.0, 1.0), End.HUBS_MET),
-])
+@pytest.mark.parametrize(
+    ('rig', 'state', 'end'),
+    [
+        (GENTLE, FRONT_TOO_SLOW, End.STANDING),
+        (UNCOUPLED, State(-ALPHA, 0.0, -ALPHA, 0.0), End.STANDING),
+        (UNCOUPLED, State(-0.1, -1.5, 0.1, 1.4), End.FALLEN),
+        (UNCOUPLED._replace(slope=0.0), State(0.0, 0.0, 0.0, 0.0), End.STALLED),
+        (UNCOUPLED._replace(S0=1e-9), State(0.0, 1.0, 0.0, 1.0), End.HUBS_MET),
+    ],
+)
 def test_a_pair_ends_as_it_does_alone(rig, state, end):
     ensemble = run_ensemble(rig, [state], 500.0, 1000)
     assert End(ensemble.ends[0]) == end
@@ -178,22 +194,26 @@ def test_a_rocking_wheel_strikes_both_ways():
 
 # Refusals
 
-@pytest.mark.parametrize(('states', 'more', 'message'), [
-    ([[0.0] * 3], {}, r'shape \(N, 4\), got \(1, 3\)'),
-    ([0.0] * 4, {}, r'shape \(N, 4\)'),
-    ([[0.3, 1.0, 0.0, 1.0]], {}, 'angles within'),
-    ([[0.0, math.nan, 0.0, 1.0]], {}, 'finite'),
-    ([[0.0, math.inf, 0.0, 1.0]], {}, 'finite'),
-    ([[0.0, 1.0, 0.0, 1.0]], {'k': -1.0}, 'k must be'),
-    ([[0.0, 1.0, 0.0, 1.0]], {'b': [math.nan]}, 'b must be'),
-    ([[0.0, 1.0, 0.0, 1.0]], {'slope': 1.0}, 'slope must be'),
-    ([[0.0, 1.0, 0.0, 1.0]], {'D0': math.inf}, 'D0 must be'),
-    ([[0.0, 1.0, 0.0, 1.0]], {'k': [1.0, 2.0]}, r'k must be a scalar or of shape \(1,\), got \(2,\)'),
-    ([[0.0, 1.0, 0.0, 1.0]], {'mass': 1.0}, 'mass is no parameter of a rig; known are front.length'),
-    ([[0.0, 1.0, 0.0, 1.0]], {'seconds': math.nan}, 'seconds must be'),
-    ([[0.0, 1.0, 0.0, 1.0]], {'seconds': -1.0}, 'seconds must be'),
-    ([[0.0, 1.0, 0.0, 1.0]], {'capacity': 0}, 'capacity'),
-])
+
+@pytest.mark.parametrize(
+    ('states', 'more', 'message'),
+    [
+        ([[0.0] * 3], {}, r'shape \(N, 4\), got \(1, 3\)'),
+        ([0.0] * 4, {}, r'shape \(N, 4\)'),
+        ([[0.3, 1.0, 0.0, 1.0]], {}, 'angles within'),
+        ([[0.0, math.nan, 0.0, 1.0]], {}, 'finite'),
+        ([[0.0, math.inf, 0.0, 1.0]], {}, 'finite'),
+        ([[0.0, 1.0, 0.0, 1.0]], {'k': -1.0}, 'k must be'),
+        ([[0.0, 1.0, 0.0, 1.0]], {'b': [math.nan]}, 'b must be'),
+        ([[0.0, 1.0, 0.0, 1.0]], {'slope': 1.0}, 'slope must be'),
+        ([[0.0, 1.0, 0.0, 1.0]], {'D0': math.inf}, 'D0 must be'),
+        ([[0.0, 1.0, 0.0, 1.0]], {'k': [1.0, 2.0]}, r'k must be a scalar or of shape \(1,\), got \(2,\)'),
+        ([[0.0, 1.0, 0.0, 1.0]], {'mass': 1.0}, 'mass is no parameter of a rig; known are front.length'),
+        ([[0.0, 1.0, 0.0, 1.0]], {'seconds': math.nan}, 'seconds must be'),
+        ([[0.0, 1.0, 0.0, 1.0]], {'seconds': -1.0}, 'seconds must be'),
+        ([[0.0, 1.0, 0.0, 1.0]], {'capacity': 0}, 'capacity'),
+    ],
+)
 def test_what_cannot_be_is_refused(states, more, message):
     with pytest.raises(ValueError, match=message):
         run_ensemble(RigParams(), states, **{'seconds': 1.0, 'capacity': 9, **more})
@@ -213,7 +233,7 @@ def test_no_start_runs_forever(theta1, omega1, theta2, omega2):
 
 # Numba
 
-SMALL_CASE = '''
+SMALL_CASE = """
 import sys
 if 'plain' in sys.argv:
     sys.modules['numba'] = None
@@ -224,13 +244,19 @@ from dcdrw_sim.motion.ensemble import run_ensemble
 assert compiled.AVAILABLE != ('plain' in sys.argv)
 ensemble = run_ensemble(RigParams(slope=0.02), [(-0.2, 1.3, 0.1, 1.4), (-0.2, 0.1, 0.1, 1.4)], 3.0, 60, k=[5.0, 9.0])
 print(repr([ensemble.counts.tolist(), ensemble.ends.tolist(), ensemble.strikes['t'].tolist()]))
-'''
+"""
 
 
 def small_case(*arguments, **environment):
     process = subprocess.run(
-        [sys.executable, '-W', 'error', '-c', SMALL_CASE, *arguments], cwd=ROOT, capture_output=True, text=True,
-        timeout=120, env={**os.environ, **environment}, check=False)
+        [sys.executable, '-W', 'error', '-c', SMALL_CASE, *arguments],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env={**os.environ, **environment},
+        check=False,
+    )
     assert process.returncode == 0, process.stderr
     return eval(process.stdout)
 

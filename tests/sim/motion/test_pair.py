@@ -31,6 +31,7 @@ def strikes_of(rig, state, seconds, force=0.0):
 
 # Truths of the motion
 
+
 @pytest.mark.parametrize('rig', [PAPER, UNEQUAL.resolved(), PAPER._replace(b=5234.0), PAPER._replace(b=0.0, k=200.0)])
 def test_energy_changes_by_the_damper_s_loss_and_the_external_work_alone(rig):
     nodes, weights = np.polynomial.legendre.leggauss(16)
@@ -53,24 +54,42 @@ def test_an_uncoupled_wheel_comes_to_its_limit_cycle_in_speed_and_period(spokes)
     wheel = WheelParams(spokes=spokes)
     rig = RigParams(wheel, wheel, k=0.0, b=0.0, slope=math.radians(9.0))
     strikes = [strike for strike in strikes_of(rig, State(0.0, 2.0, 0.0, 3.0), 60.0) if strike.wheel == 1]
-    closed_form = math.sqrt(math.cos(2 * wheel.alpha) ** 2 * 4 * rig.gravity / wheel.length * math.sin(rig.slope)
-                            * math.sin(wheel.alpha) / math.sin(2 * wheel.alpha) ** 2)
+    closed_form = math.sqrt(
+        math.cos(2 * wheel.alpha) ** 2
+        * 4
+        * rig.gravity
+        / wheel.length
+        * math.sin(rig.slope)
+        * math.sin(wheel.alpha)
+        / math.sin(2 * wheel.alpha) ** 2
+    )
     assert strikes[-1].state.omega1 * math.cos(2 * wheel.alpha) == pytest.approx(closed_form, rel=1e-12)
 
     def struck(t, y):
         return y[0] - wheel.alpha
+
     struck.terminal = True
-    leg = solve_ivp(lambda t, y: (y[1], rig.gravity / wheel.length * math.sin(y[0] + rig.slope)), (0.0, 5.0),
-                    (-wheel.alpha, closed_form), 'DOP853', events=struck, rtol=1e-13, atol=1e-15)
+    leg = solve_ivp(
+        lambda t, y: (y[1], rig.gravity / wheel.length * math.sin(y[0] + rig.slope)),
+        (0.0, 5.0),
+        (-wheel.alpha, closed_form),
+        'DOP853',
+        events=struck,
+        rtol=1e-13,
+        atol=1e-15,
+    )
     assert strikes[-1].t - strikes[-2].t == pytest.approx(leg.t[-1], abs=1e-11)
 
 
-@pytest.mark.parametrize(('rig', 'start'), [
-    (UNEQUAL, start_state(UNEQUAL, 0.25)),
-    (UNEQUAL._replace(k=200.0, b=0.0, D0=0.9), start_state(UNEQUAL, 0.8)),
-    (UNEQUAL._replace(S0=-0.9, D0=0.9), State(0.1, 1.5, -0.1, 1.3)),  # the rear wheel is ahead
-    (PAPER._replace(b=5234.0), START),
-])
+@pytest.mark.parametrize(
+    ('rig', 'start'),
+    [
+        (UNEQUAL, start_state(UNEQUAL, 0.25)),
+        (UNEQUAL._replace(k=200.0, b=0.0, D0=0.9), start_state(UNEQUAL, 0.8)),
+        (UNEQUAL._replace(S0=-0.9, D0=0.9), State(0.1, 1.5, -0.1, 1.3)),  # the rear wheel is ahead
+        (PAPER._replace(b=5234.0), START),
+    ],
+)
 def test_an_integration_of_the_paper_s_equations_by_other_means_agrees(rig, start):
     expected, state = integrate(rig, start, 3.0)
     simulation = Simulation(rig, start)
@@ -83,6 +102,7 @@ def test_an_integration_of_the_paper_s_equations_by_other_means_agrees(rig, star
 
 
 # Symmetries
+
 
 def assume_apart(strikes):
     """Two strikes at one instant may come in either order."""
@@ -148,6 +168,7 @@ def test_the_motion_scales(rig, start, scales):
 
 
 # Sampling
+
 
 @few
 @given(st.lists(between(0.0, 5.0), min_size=1, max_size=30))
@@ -218,6 +239,7 @@ def test_time_only_goes_on(time):
 
 # Changes on the way
 
+
 @pytest.mark.parametrize('change', [{'k': 50.0}, {'b': 0.0}, {'D0': 0.5}, {'slope': 0.1}, {'gravity': 5.0}])
 def test_a_changed_parameter_holds_from_the_present_time_on(change):
     simulation = Simulation(PAPER, START)
@@ -228,7 +250,8 @@ def test_a_changed_parameter_holds_from_the_present_time_on(change):
     again = Simulation(PAPER._replace(**change, S0=simulation.stance_distance), state)
     strikes = simulation.advance_to(2.43).strikes
     assert [(s.wheel, s.t - 0.43) for s in strikes] == [
-        (s.wheel, pytest.approx(s.t, abs=1e-12)) for s in again.advance_to(2.0).strikes]
+        (s.wheel, pytest.approx(s.t, abs=1e-12)) for s in again.advance_to(2.0).strikes
+    ]
     assert list(simulation.state) == pytest.approx(list(again.state), abs=1e-11)
     assert simulation.steps == [a + b for a, b in zip(steps, again.steps, strict=True)]
 
@@ -328,11 +351,26 @@ def test_a_standing_wheel_is_let_go_at_the_moment_at_which_it_begins_to_tip():
 
     def tips(t, y):
         return paper_rates(rig, 1.0, np.array([-ALPHA, 0.0, *y]))[1]
+
     tips.terminal = True
-    held = solve_ivp(lambda t, y: paper_rates(rig, 1.0, np.array([-ALPHA, 0.0, *y]))[2:], (0.0, 1.0), start[2:],
-                     'DOP853', events=tips, rtol=1e-13, atol=1e-15, max_step=0.01)
-    free = solve_ivp(lambda t, y: paper_rates(rig, 1.0, y), (held.t[-1], held.t[-1] + 0.1),
-                     (-ALPHA, 0.0, *held.y[:, -1]), 'DOP853', rtol=1e-13, atol=1e-15)
+    held = solve_ivp(
+        lambda t, y: paper_rates(rig, 1.0, np.array([-ALPHA, 0.0, *y]))[2:],
+        (0.0, 1.0),
+        start[2:],
+        'DOP853',
+        events=tips,
+        rtol=1e-13,
+        atol=1e-15,
+        max_step=0.01,
+    )
+    free = solve_ivp(
+        lambda t, y: paper_rates(rig, 1.0, y),
+        (held.t[-1], held.t[-1] + 0.1),
+        (-ALPHA, 0.0, *held.y[:, -1]),
+        'DOP853',
+        rtol=1e-13,
+        atol=1e-15,
+    )
     assert 0.05 < held.t[-1] < 0.5
     simulation = Simulation(rig, start)
     while simulation.time < held.t[-1] - 1e-9:
@@ -363,6 +401,7 @@ def test_a_standing_wheel_does_no_work_on_the_other():
 
 # Refusals
 
+
 @pytest.mark.parametrize('i', range(4))
 @pytest.mark.parametrize('value', [math.nan, math.inf])
 def test_a_start_that_is_no_number_is_refused_by_name(i, value):
@@ -371,24 +410,28 @@ def test_a_start_that_is_no_number_is_refused_by_name(i, value):
         Simulation(PAPER, state)
 
 
-@pytest.mark.parametrize(('state', 'name'), [
-    (State(0.27, 0.0, 0.0, 0.0), 'theta1'), (State(0.0, 0.0, -0.27, 0.0), 'theta2')])
+@pytest.mark.parametrize(
+    ('state', 'name'), [(State(0.27, 0.0, 0.0, 0.0), 'theta1'), (State(0.0, 0.0, -0.27, 0.0), 'theta2')]
+)
 def test_a_leg_beyond_its_guard_is_refused_by_name(state, name):
     with pytest.raises(ValueError, match=f'{name} of the start must be within ±α = ±0.261799 rad'):
         Simulation(PAPER, state)
 
 
-@pytest.mark.parametrize(('change', 'message'), [
-    ({'k': -1.0}, 'k must be ≥ 0 N/m, got -1'),
-    ({'b': math.nan}, 'b must be ≥ 0 N·s/m, got nan'),
-    ({'b': 1e8}, r'b must be ≤ 1\.59e\+06 with these wheels'),
-    ({'k': 1e12}, r'k must be ≤ 5\.08e\+11 with these wheels'),
-    ({'slope': 1.0}, 'slope must be'),
-    ({'gravity': 0.0}, 'gravity must be > 0'),
-    ({'front': WheelParams(spokes=3.0)}, r'front\.spokes must be ≥ 4'),
-    ({'rear': WheelParams(mass=0.0)}, r'rear\.mass must be > 0 kg'),
-    ({'S0': math.inf}, 'S0 must be finite'),
-])
+@pytest.mark.parametrize(
+    ('change', 'message'),
+    [
+        ({'k': -1.0}, 'k must be ≥ 0 N/m, got -1'),
+        ({'b': math.nan}, 'b must be ≥ 0 N·s/m, got nan'),
+        ({'b': 1e8}, r'b must be ≤ 1\.59e\+06 with these wheels'),
+        ({'k': 1e12}, r'k must be ≤ 5\.08e\+11 with these wheels'),
+        ({'slope': 1.0}, 'slope must be'),
+        ({'gravity': 0.0}, 'gravity must be > 0'),
+        ({'front': WheelParams(spokes=3.0)}, r'front\.spokes must be ≥ 4'),
+        ({'rear': WheelParams(mass=0.0)}, r'rear\.mass must be > 0 kg'),
+        ({'S0': math.inf}, 'S0 must be finite'),
+    ],
+)
 def test_an_impossible_rig_is_refused_by_name(change, message):
     with pytest.raises(ValueError, match=message):
         Simulation(PAPER._replace(**change), START)
@@ -440,9 +483,15 @@ def test_a_wheel_balanced_on_its_apex_stays_there():
 
 
 @settings(max_examples=60, deadline=None)
-@given(rigs, between(-0.6, 0.6), st.sampled_from([0.0, 5234.0]), st.sampled_from([4.0, 6.0, 12.0]),
-       st.tuples(*[st.sampled_from([-1.0, 1.0, 0.0, 0.3])] * 2), st.tuples(*[st.sampled_from([0.0, -0.7, 0.7])] * 2),
-       st.lists(st.sampled_from([0.0, 40.0, -40.0, 400.0, -400.0]), min_size=4, max_size=4))
+@given(
+    rigs,
+    between(-0.6, 0.6),
+    st.sampled_from([0.0, 5234.0]),
+    st.sampled_from([4.0, 6.0, 12.0]),
+    st.tuples(*[st.sampled_from([-1.0, 1.0, 0.0, 0.3])] * 2),
+    st.tuples(*[st.sampled_from([0.0, -0.7, 0.7])] * 2),
+    st.lists(st.sampled_from([0.0, 40.0, -40.0, 400.0, -400.0]), min_size=4, max_size=4),
+)
 def test_whatever_happens_legs_stay_within_their_guards_and_time_goes_on(rig, slope, b, spokes, parts, speeds, forces):
     rig = rig._replace(slope=slope, b=b, front=rig.front._replace(spokes=spokes))
     simulation = Simulation(rig, rolling(rig, parts[0], speeds[0], parts[1], speeds[1]))

@@ -21,8 +21,11 @@ REFERENCE = ROOT / 'tests' / 'data' / 'strikes.json'
 CASES, _ = read_cases(REFERENCE)
 
 
-@pytest.mark.parametrize(('case', 'listed'), list(zip(CASES, json.loads(REFERENCE.read_text()), strict=True)),
-                         ids=[case.name for case in CASES])
+@pytest.mark.parametrize(
+    ('case', 'listed'),
+    list(zip(CASES, json.loads(REFERENCE.read_text()), strict=True)),
+    ids=[case.name for case in CASES],
+)
 def test_every_strike_of_the_reference_to_1e_9(case, listed):
     result = run(case.rig, case.state, strikes=len(listed['strikes']))
     assert result.end is End.STRIKES
@@ -33,11 +36,14 @@ def test_every_strike_of_the_reference_to_1e_9(case, listed):
         assert strike.direction == FORWARD
 
 
-@pytest.mark.parametrize(('rig', 'start'), [
-    (preset('paper'), start_state(preset('paper'), 0.216)),
-    (UNEQUAL, start_state(UNEQUAL, 0.7)),
-    (GENTLE, State(-ALPHA, 0.3, 0.0, -0.2)),  # rocks
-])
+@pytest.mark.parametrize(
+    ('rig', 'start'),
+    [
+        (preset('paper'), start_state(preset('paper'), 0.216)),
+        (UNEQUAL, start_state(UNEQUAL, 0.7)),
+        (GENTLE, State(-ALPHA, 0.3, 0.0, -0.2)),  # rocks
+    ],
+)
 def test_a_strike_takes_sin2_of_2_alpha_of_that_wheel_and_nothing_else(rig, start):
     simulation, struck = Simulation(rig, start), 0
     rig = simulation.rig
@@ -55,7 +61,8 @@ def test_a_strike_takes_sin2_of_2_alpha_of_that_wheel_and_nothing_else(rig, star
         assert after[2 * i + 1] == before[2 * i + 1] * math.cos(2 * wheel.alpha)
         assert (after[2 - 2 * i], after[3 - 2 * i]) == (before[2 - 2 * i], before[3 - 2 * i])
         assert hub_distance(rig, after, stance_distance(rig, *simulation.steps)) == pytest.approx(
-            hub_distance(rig, before, stance_distance(rig, *steps)), abs=1e-14)
+            hub_distance(rig, before, stance_distance(rig, *steps)), abs=1e-14
+        )
         assert simulation.steps[i] == steps[i] + strike.direction
         assert simulation.steps[1 - i] == steps[1 - i]
 
@@ -132,12 +139,21 @@ def test_a_strike_that_only_just_happens_is_a_strike_without_speed():
 
 def test_a_leg_that_only_dips_into_its_guard_within_a_step_strikes():
     # A stiff spring shakes a light wheel: within 0.03 s it leaves its guard, comes back to it and leaves it again.
-    rig = RigParams(WheelParams(0.96, 14.0, 5.0), WheelParams(1.58, 6.4, 40.0), k=1318.0, b=0.0, D0=1.484, S0=-0.59,
-                    slope=0.2686)
+    rig = RigParams(
+        WheelParams(0.96, 14.0, 5.0), WheelParams(1.58, 6.4, 40.0), k=1318.0, b=0.0, D0=1.484, S0=-0.59, slope=0.2686
+    )
     simulation = Simulation(rig, State(-rig.front.alpha, 0.009, -0.011, 0.957))
     simulation.external_force = 140.0
-    expected = solve_ivp(lambda t, y: paper_rates(rig, -0.59, y, 140.0), (0.0, 0.03), simulation.state, 'DOP853',
-                         events=lambda t, y: y[0] + rig.front.alpha, rtol=1e-12, atol=1e-14, max_step=1e-4)
+    expected = solve_ivp(
+        lambda t, y: paper_rates(rig, -0.59, y, 140.0),
+        (0.0, 0.03),
+        simulation.state,
+        'DOP853',
+        events=lambda t, y: y[0] + rig.front.alpha,
+        rtol=1e-12,
+        atol=1e-14,
+        max_step=1e-4,
+    )
     touches = [t for t in expected.t_events[0] if t > 1e-6]
     strike = simulation.advance_to(0.03).strikes[0]
     assert (strike.wheel, strike.direction) == (1, BACKWARD)

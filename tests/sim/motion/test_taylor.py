@@ -26,7 +26,7 @@ def expanded(rig, state, external_force=0.0):
 
 
 def coefficients(w, series):
-    return np.array(w[series:series + (ORDER + 1) * LANES:LANES])
+    return np.array(w[series : series + (ORDER + 1) * LANES : LANES])
 
 
 @few
@@ -55,8 +55,10 @@ def test_the_series_satisfy_the_equations_of_motion_along_the_step(rig, start):
     w = expanded(rig, state)
     h = 0.5 * taylor.step_size(w, 0, 1e-16)
     there = State(*taylor.motion(w, h, h))
-    rates = [np.polynomial.polynomial.polyval(h, np.polynomial.polynomial.polyder(coefficients(w, omega)))
-             for omega in (OMEGA1, OMEGA2)]
+    rates = [
+        np.polynomial.polynomial.polyval(h, np.polynomial.polynomial.polyder(coefficients(w, omega)))
+        for omega in (OMEGA1, OMEGA2)
+    ]
     assert rates == pytest.approx(accelerations(rig, there, rig.S0), rel=1e-9, abs=1e-9)
 
 
@@ -113,5 +115,6 @@ def test_all_lanes_of_an_array_give_what_a_list_gives_for_one():
     for l, state in enumerate(states):
         alone = expanded(UNEQUAL, state)
         for series in (THETA1, OMEGA1, THETA2, OMEGA2):
-            assert w[series + l:series + l + (ORDER + 1) * LANES:LANES] == pytest.approx(
-                coefficients(alone, series), rel=1e-11, abs=1e-13)
+            assert w[series + l : series + l + (ORDER + 1) * LANES : LANES] == pytest.approx(
+                coefficients(alone, series), rel=1e-11, abs=1e-13
+            )

@@ -30,9 +30,13 @@ def test_dense_output_is_the_motion_of_the_simulation():
         row = State(*(column[j] for column in trajectory[1:5]))
         assert list(row) == pytest.approx(list(simulation.state), abs=1e-12)
         assert (trajectory.steps1[j], trajectory.steps2[j]) == tuple(simulation.steps)
-        assert [trajectory.rotation1[j], trajectory.rotation2[j], trajectory.coupler_length[j],
-                trajectory.coupler_rate[j], trajectory.coupler_force[j]] == pytest.approx(
-            [motion.rotation1, motion.rotation2, motion.length, motion.rate, motion.force], abs=1e-10)
+        assert [
+            trajectory.rotation1[j],
+            trajectory.rotation2[j],
+            trajectory.coupler_length[j],
+            trajectory.coupler_rate[j],
+            trajectory.coupler_force[j],
+        ] == pytest.approx([motion.rotation1, motion.rotation2, motion.length, motion.rate, motion.force], abs=1e-10)
 
 
 def test_times_may_come_in_any_order_and_alone():
@@ -59,6 +63,7 @@ def test_times_outside_the_run_are_refused(times):
 
 
 # Ends
+
 
 def test_a_run_ends_with_its_time_or_with_its_strikes():
     assert RUN.end is End.TIME
@@ -117,8 +122,17 @@ def test_hubs_that_meet_end_the_run_where_they_do():
     assert result.at(result.duration).coupler_length[0] < 1e-6
 
 
-@pytest.mark.parametrize('limits', [{}, {'seconds': -1.0}, {'seconds': math.nan}, {'strikes': 0}, {'strikes': math.nan},
-                                    {'seconds': math.inf, 'strikes': math.inf}])
+@pytest.mark.parametrize(
+    'limits',
+    [
+        {},
+        {'seconds': -1.0},
+        {'seconds': math.nan},
+        {'strikes': 0},
+        {'strikes': math.nan},
+        {'seconds': math.inf, 'strikes': math.inf},
+    ],
+)
 def test_a_run_without_sensible_limit_is_refused(limits):
     with pytest.raises(ValueError, match='a run needs a limit, seconds ≥ 0 or strikes ≥ 1'):
         run(UNEQUAL, START, **limits)

@@ -26,8 +26,16 @@ def half_step(k, b, slope, before, period):
         theta1, rate1, theta2, rate2 = y
         force = k * (ALPHA + theta1 - theta2) + b * (rate1 - rate2)
         return [rate1, theta1 + slope - force, rate2, theta2 + slope + force]
-    return solve_ivp(rates, (0.0, 0.5 * period), [-ALPHA, KEPT * omega1, theta2, omega2], 'DOP853', rtol=1e-12,
-                     atol=1e-14, dense_output=True)
+
+    return solve_ivp(
+        rates,
+        (0.0, 0.5 * period),
+        [-ALPHA, KEPT * omega1, theta2, omega2],
+        'DOP853',
+        rtol=1e-12,
+        atol=1e-14,
+        dense_output=True,
+    )
 
 
 @pytest.mark.parametrize(('k', 'b'), COUPLERS)
@@ -55,6 +63,7 @@ def test_multipliers_are_those_of_its_own_map(k, b):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if motion.sol(middle)[2] < ALPHA else (low, middle)
         return motion.sol(low)[[3, 0, 1]]
+
     columns = [(half(state + kick) - half(state - kick)) / 2e-6 for kick in 1e-6 * np.eye(3)]
     derivative = np.linalg.matrix_power(np.column_stack(columns), 2)
     assert sorted(abs(np.linalg.eigvals(derivative))) == pytest.approx(sorted(abs(gait.multipliers)), abs=1e-5)

@@ -32,8 +32,10 @@ def test_every_phase_between_keeps_the_order(phase):
 @quick
 @given(between(0.0, 0.999))
 def test_a_rear_foot_leads_the_front_foot_of_its_side(phase):
-    falls = {(contact.foot, round(contact.start - phase / 2 * (contact.foot > 2), 6)): contact.start
-             for contact in steady_contacts(phase, 2)}
+    falls = {
+        (contact.foot, round(contact.start - phase / 2 * (contact.foot > 2), 6)): contact.start
+        for contact in steady_contacts(phase, 2)
+    }
     assert falls[1, 1.0] - falls[3, 0.5] == pytest.approx(rear_lead(phase))
     assert falls[2, 0.5] - falls[4, 0.0] == pytest.approx(rear_lead(phase))
 
@@ -65,14 +67,26 @@ def test_a_walk_of_the_coupled_pair_is_the_four_beat_walk():
 
 def test_feet_of_a_wheel_take_turns_from_strike_to_strike():
     found = contacts([strike(2, 0.1), strike(1, 0.2), strike(2, 0.3), strike(1, 0.4), strike(2, 0.5)], 0.6)
-    assert found == [Contact(3, 0.1, 0.3), Contact(1, 0.2, 0.4), Contact(4, 0.3, 0.5), Contact(2, 0.4, 0.6),
-                     Contact(3, 0.5, 0.6)]
+    assert found == [
+        Contact(3, 0.1, 0.3),
+        Contact(1, 0.2, 0.4),
+        Contact(4, 0.3, 0.5),
+        Contact(2, 0.4, 0.6),
+        Contact(3, 0.5, 0.6),
+    ]
 
 
 def test_a_slipped_step_turns_the_sequence_round():
     steady = [strike(1, 1.0), strike(2, 1.5), strike(1, 2.0), strike(2, 2.5)]
-    slipped = [strike(1, 3.0), strike(1, 4.0), strike(2, 4.5), strike(1, 5.0), strike(2, 5.5), strike(1, 6.0),
-               strike(2, 6.5)]
+    slipped = [
+        strike(1, 3.0),
+        strike(1, 4.0),
+        strike(2, 4.5),
+        strike(1, 5.0),
+        strike(2, 5.5),
+        strike(1, 6.0),
+        strike(2, 6.5),
+    ]
     assert order(contacts(steady, 3.0)) == '1-4-2-3'
     assert order(contacts(steady + slipped, 7.0)) == '1-3-2-4'
 

@@ -25,25 +25,34 @@ from tests.sim.rigs import ALPHA, between
 PAPER = RigParams().resolved()
 LONG = PAPER._replace(D0=1e4)
 FRONT = WheelParams(0.9, 8.0, 11.0)
-UNEQUAL = RigParams(FRONT, WheelParams(1.1, 12.0, math.pi / math.asin(0.9 / 1.1 * math.sin(FRONT.alpha))), D0=1.3,
-                    slope=math.radians(3.0)).resolved()
+UNEQUAL = RigParams(
+    FRONT,
+    WheelParams(1.1, 12.0, math.pi / math.asin(0.9 / 1.1 * math.sin(FRONT.alpha))),
+    D0=1.3,
+    slope=math.radians(3.0),
+).resolved()
 few = settings(max_examples=25, deadline=None)
 phases = between(0.01, 0.99)
 rigs = st.builds(
     lambda length, mass1, mass2, spokes, bar: RigParams(
-        WheelParams(length, mass1, spokes), WheelParams(length, mass2, spokes), D0=bar * length,
-        slope=math.radians(6.0)).resolved(),
-    between(0.5, 1.5), between(5.0, 20.0), between(5.0, 20.0), between(8.0, 16.0), between(0.9, 3.0))
+        WheelParams(length, mass1, spokes), WheelParams(length, mass2, spokes), D0=bar * length, slope=math.radians(6.0)
+    ).resolved(),
+    between(0.5, 1.5),
+    between(5.0, 20.0),
+    between(5.0, 20.0),
+    between(8.0, 16.0),
+    between(0.9, 3.0),
+)
 
 
 # A second opinion in hub coordinates (x1, y1, x2, y2) along and normal to the slope: Newton's equations with the
 # spokes and the bar as constraints, whose forces are solved for, by scipy.
 
+
 def constraints(feet, hubs):
     """Jacobian of the half squared lengths of front spoke, rear spoke and bar, shape (3, 4)."""
     (x1, y1, x2, y2), (foot1, foot2) = hubs, feet
-    return np.array([[x1 - foot1, y1, 0.0, 0.0], [0.0, 0.0, x2 - foot2, y2],
-                     [x1 - x2, y1 - y2, x2 - x1, y2 - y1]])
+    return np.array([[x1 - foot1, y1, 0.0, 0.0], [0.0, 0.0, x2 - foot2, y2], [x1 - x2, y1 - y2, x2 - x1, y2 - y1]])
 
 
 def masses(rig):
@@ -66,38 +75,61 @@ def rates(rig, feet, y):
 
 def energy(rig, y):
     height = y[[1, 3]] * math.cos(rig.slope) - y[[0, 2]] * math.sin(rig.slope)
-    return 0.5 * masses(rig) @ y[4:]**2 + rig.gravity * masses(rig)[[0, 2]] @ height
+    return 0.5 * masses(rig) @ y[4:] ** 2 + rig.gravity * masses(rig)[[0, 2]] @ height
 
 
 def simulate(rig, start, S, strikes):
     """Wheel, time, rear or front angle of the other wheel, and kinetic energy left, of each strike."""
     lengths, alphas, feet = (rig.front.length, rig.rear.length), (rig.front.alpha, rig.rear.alpha), [S, 0.0]
     theta, omega = np.array(start[::2]), np.array(start[1::2])
-    y = np.concatenate([[S + lengths[0] * math.sin(theta[0]), lengths[0] * math.cos(theta[0]),
-                         lengths[1] * math.sin(theta[1]), lengths[1] * math.cos(theta[1])],
-                        [lengths[0] * omega[0] * math.cos(theta[0]), -lengths[0] * omega[0] * math.sin(theta[0]),
-                         lengths[1] * omega[1] * math.cos(theta[1]), -lengths[1] * omega[1] * math.sin(theta[1])]])
+    y = np.concatenate(
+        [
+            [
+                S + lengths[0] * math.sin(theta[0]),
+                lengths[0] * math.cos(theta[0]),
+                lengths[1] * math.sin(theta[1]),
+                lengths[1] * math.cos(theta[1]),
+            ],
+            [
+                lengths[0] * omega[0] * math.cos(theta[0]),
+                -lengths[0] * omega[0] * math.sin(theta[0]),
+                lengths[1] * omega[1] * math.cos(theta[1]),
+                -lengths[1] * omega[1] * math.sin(theta[1]),
+            ],
+        ]
+    )
     t, found = 0.0, []
     for _ in range(strikes):
+
         def reaches(i):
             def guard(t, state):
                 return math.atan2(state[2 * i] - feet[i], state[2 * i + 1]) - alphas[i]
+
             guard.terminal, guard.direction = True, 1
             return guard
-        leg = solve_ivp(lambda t, y: rates(rig, feet, y), (t, t + 20.0), y, 'DOP853', rtol=1e-11, atol=1e-13,
-                        events=[reaches(0), reaches(1)])
+
+        leg = solve_ivp(
+            lambda t, y: rates(rig, feet, y),
+            (t, t + 20.0),
+            y,
+            'DOP853',
+            rtol=1e-11,
+            atol=1e-13,
+            events=[reaches(0), reaches(1)],
+        )
         assert energy(rig, leg.y[:, -1]) == pytest.approx(energy(rig, y), abs=1e-8 * abs(energy(rig, y)))
         t, y = leg.t[-1], leg.y[:, -1]
         i = 0 if leg.t_events[0].size else 1
         feet[i] += 2.0 * lengths[i] * math.sin(alphas[i])
         y[4:] = saddle(rig, feet, y[:4], np.concatenate([masses(rig) * y[4:], np.zeros(3)]))[:4]
         other = math.atan2(y[2 - 2 * i] - feet[1 - i], y[3 - 2 * i])
-        found.append((i + 1, t, other, 0.5 * masses(rig) @ y[4:]**2))
+        found.append((i + 1, t, other, 0.5 * masses(rig) @ y[4:] ** 2))
     return found
 
 
-@pytest.mark.parametrize(('rig', 'phase', 'push'), [
-    (PAPER, 0.216, 1.0), (PAPER, 0.5, 1.4), (PAPER, 0.9, 0.8), (UNEQUAL, 0.3, 1.2)])
+@pytest.mark.parametrize(
+    ('rig', 'phase', 'push'), [(PAPER, 0.216, 1.0), (PAPER, 0.5, 1.4), (PAPER, 0.9, 0.8), (UNEQUAL, 0.3, 1.2)]
+)
 def test_an_integration_with_constraint_forces_agrees_and_the_phase_never_changes(rig, phase, push):
     pair = RigidPair(rig, phase)
     first = pair.stances[0]
@@ -136,14 +168,20 @@ def test_the_coupled_pair_comes_ever_closer_with_a_stiffer_coupler():
             strikes += [strike] if strike else []
         assert [strike.wheel for strike in strikes] == [2, 1, 2, 1]
         before = pair.state(*first.end, first.S, gait.energy + first.drop)
-        errors.append([strikes[0].state.theta1 - before.theta1, strikes[0].state.omega1 - before.omega1,
-                       strikes[0].state.omega2 - before.omega2])
+        errors.append(
+            [
+                strikes[0].state.theta1 - before.theta1,
+                strikes[0].state.omega1 - before.omega1,
+                strikes[0].state.omega2 - before.omega2,
+            ]
+        )
         assert strikes[3].t == pytest.approx(2.0 * gait.period, rel=0.3 / b)
     for softer, stiffer in pairwise(np.abs(errors)):
         assert softer / stiffer == pytest.approx(2.0, rel=0.1)  # as 1/b
 
 
 # Strikes
+
 
 @few
 @given(rigs, phases)
@@ -171,14 +209,23 @@ def test_a_strike_s_impulses_along_spokes_and_bar_change_the_hubs_momenta(rig, p
         before = pair.state(*stance.end, stance.S, 2.0)
         impact = pair.impact(before, stance.S, stance.struck)
         after, S = impact.state, stance.S + rig.front.step_length * (stance.struck[0] - stance.struck[1])
-        hubs = np.array([[S + rig.front.length * math.sin(after.theta1), rig.front.length * math.cos(after.theta1)],
-                         [rig.rear.length * math.sin(after.theta2), rig.rear.length * math.cos(after.theta2)]])
+        hubs = np.array(
+            [
+                [S + rig.front.length * math.sin(after.theta1), rig.front.length * math.cos(after.theta1)],
+                [rig.rear.length * math.sin(after.theta2), rig.rear.length * math.cos(after.theta2)],
+            ]
+        )
         bar = (hubs[0] - hubs[1]) / rig.D0
         for state_before, state_after, wheel, impulse, pull in (
-                (before[:2], after[:2], rig.front, impact.front_foot, -impact.bar),
-                (before[2:], after[2:], rig.rear, impact.rear_foot, impact.bar)):
-            change = [wheel.mass * wheel.length * (state_after[1] * part(state_after[0]) - state_before[1]
-                                                   * part(state_before[0])) for part in (np.cos, lambda a: -np.sin(a))]
+            (before[:2], after[:2], rig.front, impact.front_foot, -impact.bar),
+            (before[2:], after[2:], rig.rear, impact.rear_foot, impact.bar),
+        ):
+            change = [
+                wheel.mass
+                * wheel.length
+                * (state_after[1] * part(state_after[0]) - state_before[1] * part(state_before[0]))
+                for part in (np.cos, lambda a: -np.sin(a))
+            ]
             spoke = np.array([math.sin(state_after[0]), math.cos(state_after[0])])
             assert change == pytest.approx(impulse * spoke + pull * bar, abs=1e-10)
 
@@ -206,6 +253,7 @@ def test_the_other_foot_is_pulled_at_one_strike_in_a_step_but_hardly_at_50_perce
 
 
 # Steady gait
+
 
 @few
 @given(rigs, phases)
@@ -245,6 +293,7 @@ def test_a_wheel_pair_that_is_too_slow_does_not_come_over_its_top():
 def test_fastest_phase_is_the_maximum_of_speed_and_tends_to_50_percent_with_the_bar_s_length():
     def speed(rig, phase):
         return RigidPair(rig, phase).gait().velocity
+
     offsets = []
     for bar in (1.0, 4.0, 16.0, 1e3):
         rig = PAPER._replace(D0=bar)
@@ -286,6 +335,7 @@ def test_energy_per_metre_at_one_speed_is_least_near_50_percent():
 
 
 # What has no gait
+
 
 @pytest.mark.parametrize('phase', [-0.1, 1.0, math.nan])
 def test_impossible_phase_is_refused(phase):

@@ -33,8 +33,9 @@ wheels = st.builds(WheelParams, between(0.5, 1.5), st.just(10.0), between(6.0, 2
 
 def alone(wheel, slope, theta, omega):
     """The wheel in the project's simulation, a second one beside it without a coupler."""
-    return Simulation(RigParams(wheel, wheel, k=0.0, b=0.0, slope=slope, gravity=GRAVITY),
-                      State(theta, omega, theta, omega))
+    return Simulation(
+        RigParams(wheel, wheel, k=0.0, b=0.0, slope=slope, gravity=GRAVITY), State(theta, omega, theta, omega)
+    )
 
 
 def strikes_of(simulation, count):
@@ -72,9 +73,17 @@ def test_step_map_is_that_of_the_simulation(wheel, slope, part):
 def test_step_map_is_that_of_an_integration_by_other_means():
     def struck(t, y):
         return y[0] - WHEEL.alpha
+
     struck.terminal = True
-    leg = solve_ivp(lambda t, y: (y[1], GRAVITY / WHEEL.length * math.sin(y[0] + SLOPE)), (0.0, 5.0),
-                    (-WHEEL.alpha, 1.3), 'DOP853', events=struck, rtol=1e-12, atol=1e-14)
+    leg = solve_ivp(
+        lambda t, y: (y[1], GRAVITY / WHEEL.length * math.sin(y[0] + SLOPE)),
+        (0.0, 5.0),
+        (-WHEEL.alpha, 1.3),
+        'DOP853',
+        events=struck,
+        rtol=1e-12,
+        atol=1e-14,
+    )
     assert next_speed(WHEEL, SLOPE, GRAVITY, 1.3) == pytest.approx(leg.y[1, -1] * math.cos(2 * WHEEL.alpha), rel=1e-11)
 
 
@@ -108,8 +117,14 @@ def test_below_the_speed_to_pass_there_is_no_next_step():
 @given(wheels, between(0.0, 0.7))
 def test_period_is_the_integral_of_the_inverse_speed(wheel, slope):
     assume(slope > gentlest_slope(wheel) * 1.01)
-    expected = quad(lambda theta: 1.0 / float(limit_cycle_speed(wheel, slope, GRAVITY, theta)), -wheel.alpha,
-                    wheel.alpha, points=[max(-slope, -wheel.alpha)], epsabs=0.0, epsrel=1e-11)[0]
+    expected = quad(
+        lambda theta: 1.0 / float(limit_cycle_speed(wheel, slope, GRAVITY, theta)),
+        -wheel.alpha,
+        wheel.alpha,
+        points=[max(-slope, -wheel.alpha)],
+        epsabs=0.0,
+        epsrel=1e-11,
+    )[0]
     assert limit_cycle_period(wheel, slope, GRAVITY) == pytest.approx(expected, rel=1e-9)
 
 
@@ -158,8 +173,12 @@ def test_on_too_gentle_a_slope_everything_comes_to_stand():
 def test_uphill_bands_are_where_it_comes_back_to_roll():
     bands = uphill_bands(WHEEL, SLOPE, GRAVITY, 4)
     for steps, (low, high) in enumerate(bands):
-        for omega, expected in ((low - 1e-6, Fate.STANDS), (low + 1e-6, Fate.ROLLS), (high - 1e-6, Fate.ROLLS),
-                                (high + 1e-6, Fate.STANDS)):
+        for omega, expected in (
+            (low - 1e-6, Fate.STANDS),
+            (low + 1e-6, Fate.ROLLS),
+            (high - 1e-6, Fate.ROLLS),
+            (high + 1e-6, Fate.STANDS),
+        ):
             assert fate(WHEEL, SLOPE, GRAVITY, WHEEL.alpha, -omega) is expected
         strikes = strikes_of(alone(WHEEL, SLOPE, WHEEL.alpha, -(low + high) / 2), steps + 3)
         assert [strike.direction for strike in strikes] == [BACKWARD] * steps + [FORWARD] * 3
@@ -173,7 +192,8 @@ def test_bands_of_a_slope_steeper_than_the_spokes_leave_no_gap():
 
 def test_each_band_ends_where_the_wheel_would_pass_its_apex_uphill():
     assert uphill_bands(WHEEL, SLOPE, GRAVITY, 1)[0][1] ** 2 == pytest.approx(
-        speed_to_pass(WHEEL, SLOPE, GRAVITY, -WHEEL.alpha) ** 2 + slope_gain(WHEEL, SLOPE, GRAVITY))
+        speed_to_pass(WHEEL, SLOPE, GRAVITY, -WHEEL.alpha) ** 2 + slope_gain(WHEEL, SLOPE, GRAVITY)
+    )
 
 
 @pytest.mark.parametrize('spokes', [6.0, 8.0, 12.0, 20.0])
@@ -181,8 +201,11 @@ def test_at_the_steepest_slope_the_foot_presses_no_more_at_the_end_of_a_stance(s
     wheel = WheelParams(spokes=spokes)
 
     def push(slope, theta):  # along the spoke, per mass
-        return GRAVITY * math.cos(theta + slope) - wheel.length * float(
-            limit_cycle_speed(wheel, slope, GRAVITY, theta)) ** 2
+        return (
+            GRAVITY * math.cos(theta + slope)
+            - wheel.length * float(limit_cycle_speed(wheel, slope, GRAVITY, theta)) ** 2
+        )
+
     slope = steepest_slope(wheel)
     assert push(slope, wheel.alpha) == pytest.approx(0.0, abs=1e-9 * GRAVITY)
     assert push(slope * 0.99, wheel.alpha) > 0.0

@@ -17,6 +17,8 @@ from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatorParams
 from tests.bench import Bench
 
+pytestmark = pytest.mark.processes
+
 STEP_NS = 10_000_000  # at 100 Hz
 
 
@@ -28,8 +30,9 @@ def samples(messages):
 def set_parameter(bench: Bench, name: str, value: float | int):
     kind = ParameterType.PARAMETER_INTEGER if isinstance(value, int) else ParameterType.PARAMETER_DOUBLE
     field = 'integer_value' if isinstance(value, int) else 'double_value'
-    request = SetParameters.Request(parameters=[
-        Parameter(name=name, value=ParameterValue(**{'type': kind, field: value}))])
+    request = SetParameters.Request(
+        parameters=[Parameter(name=name, value=ParameterValue(**{'type': kind, field: value}))]
+    )
     return bench.call(SetParameters, '/simulator/set_parameters', request).results[0]
 
 
@@ -46,7 +49,7 @@ def moving(messages):
     """From the last held sample on."""
     read = samples(messages)
     first = next((i for i, sample in enumerate(read) if sample.front.rate), len(read))
-    return read[max(first - 1, 0):]
+    return read[max(first - 1, 0) :]
 
 
 def test_joint_states_are_the_model_sampled_at_the_rate(bench):
@@ -162,12 +165,15 @@ def test_as_fast_as_possible_outruns_the_clock(bench):
     bench.wait(lambda: heard and stamp_ns(heard[-1].header.stamp) > 100 * SECOND, 'a hundred simulated seconds')
 
 
-@pytest.mark.parametrize(('parameters', 'message'), [
-    ({'front__spokes': 3}, 'front.spokes must be ≥ 4, got 3'),
-    ({'k': '.nan'}, 'k must be ≥ 0 N/m, got nan'),
-    ({'slope': 0.001}, 'too gentle'),
-    ({'rate': 'fast'}, 'rate must be a number'),
-])
+@pytest.mark.parametrize(
+    ('parameters', 'message'),
+    [
+        ({'front__spokes': 3}, 'front.spokes must be ≥ 4, got 3'),
+        ({'k': '.nan'}, 'k must be ≥ 0 N/m, got nan'),
+        ({'slope': 0.001}, 'too gentle'),
+        ({'rate': 'fast'}, 'rate must be a number'),
+    ],
+)
 def test_impossible_parameters_end_it_with_one_line(bench, parameters, message):
     process = bench.start('simulator', **parameters)
     assert process.wait(20) == 2

@@ -72,8 +72,10 @@ def test_margins_are_where_settling_ends():
     found = assess(TASK, 22.0, 8.0)
     slope = found.margins['slope']
     assert 0.8 < slope.low < 0.9
-    inside, outside = (score(TASK, np.array([22.0]), np.array([8.0]), np.array([factor * slope.low * RIG.slope]))
-                       for factor in (1.0 + 1e-9, 0.995))
+    inside, outside = (
+        score(TASK, np.array([22.0]), np.array([8.0]), np.array([factor * slope.low * RIG.slope]))
+        for factor in (1.0 + 1e-9, 0.995)
+    )
     assert inside.verdict[0] == Verdict.SETTLES
     assert outside.verdict[0] > Verdict.SETTLES
     stiff = found.margins['k']

@@ -19,13 +19,15 @@ from tests.sim.rigs import GENTLE, UNCOUPLED, between
 
 SWEEP = preset('paper-sweep').resolved()
 SIN = math.sin(math.pi / 12)
-TABLE = np.array([  # contract §3: D0, k̂, b̂, θ2* [deg], moduli
-    (1.0, 1e-4, 0.15, -0.615, 0.9477, 0.7826, 0.394),
-    (1.0, 1e-3, 0.3, -0.128, 0.9166, 0.8298, 0.1845),
-    (1.0 + SIN, 5e-3, 0.15, -0.863, 0.8911, 0.7829, 0.4188),
-    (1.0 + SIN, 1e-2, 0.2, -0.933, 0.8450, 0.7976, 0.3429),
-    (1.0 + SIN, 1e-3, 3.0, -0.971, 0.9481, 0.8078, 0.000),
-])
+TABLE = np.array(
+    [  # contract §3: D0, k̂, b̂, θ2* [deg], moduli
+        (1.0, 1e-4, 0.15, -0.615, 0.9477, 0.7826, 0.394),
+        (1.0, 1e-3, 0.3, -0.128, 0.9166, 0.8298, 0.1845),
+        (1.0 + SIN, 5e-3, 0.15, -0.863, 0.8911, 0.7829, 0.4188),
+        (1.0 + SIN, 1e-2, 0.2, -0.933, 0.8450, 0.7976, 0.3429),
+        (1.0 + SIN, 1e-3, 3.0, -0.971, 0.9481, 0.8078, 0.000),
+    ]
+)
 STARTS = (0.3, 0.5, 0.8)
 
 
@@ -53,11 +55,14 @@ def test_a_point_is_what_the_direct_functions_say():
     assert cycle == pytest.approx(list(fixed.state), abs=1e-10)
     assert found['cycle_period'] == pytest.approx(fixed.period)
     assert found['multipliers'] == pytest.approx(abs(fixed.multipliers), abs=1e-7)
-    trials = [return_map.iterate(return_map.at_phase(phase), int(count) - 1)
-              for phase, count in zip(STARTS, found['start_sections'], strict=True)]
-    for states, *columns in zip(trials, *(found[f'section_{name}'] for name in (
-            'omega1', 'theta2', 'omega2', 'coupler_length')), strict=True):
-        assert np.array(columns)[:, :len(states)].T == pytest.approx(return_map.raw(states), abs=1e-8)
+    trials = [
+        return_map.iterate(return_map.at_phase(phase), int(count) - 1)
+        for phase, count in zip(STARTS, found['start_sections'], strict=True)
+    ]
+    for states, *columns in zip(
+        trials, *(found[f'section_{name}'] for name in ('omega1', 'theta2', 'omega2', 'coupler_length')), strict=True
+    ):
+        assert np.array(columns)[:, : len(states)].T == pytest.approx(return_map.raw(states), abs=1e-8)
     raw, affine = fit_raw(map(return_map.raw, trials)), fit_affine(trials)
     assert found['raw_eigenvalues'] == pytest.approx(abs(raw.eigenvalues), abs=1e-5)
     assert found['affine_eigenvalues'] == pytest.approx(abs(affine.eigenvalues), abs=1e-6)
@@ -95,10 +100,10 @@ def test_a_point_depends_on_no_other():
     for index in range(7):
         alone = judge_points(spread(SWEEP, 1, {'k': k[index], 'b': b[index]}), 80.0, STARTS, room=60)
         for name, value in alone.items():
-            whole = together[name][index:index + 1]
+            whole = together[name][index : index + 1]
             if name.startswith('section_'):
-                assert np.isnan(whole[..., value.shape[-1]:]).all()
-                whole = whole[..., :value.shape[-1]]
+                assert np.isnan(whole[..., value.shape[-1] :]).all()
+                whole = whole[..., : value.shape[-1]]
             assert np.ascontiguousarray(whole).tobytes() == np.ascontiguousarray(value).tobytes(), name
 
 

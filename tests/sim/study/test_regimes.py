@@ -41,6 +41,7 @@ def band():
 
 # Folds
 
+
 def test_stall_band_of_the_papers_sweep(band):
     low, high = band
     assert low.values == pytest.approx([0.449388, 0.44883, 0.442565], abs=1e-4)
@@ -56,8 +57,10 @@ def test_at_a_fold_a_multiplier_is_one(band):
 @pytest.mark.parametrize('end', [0, 1])
 def test_just_inside_the_edge_the_exact_map_has_a_stable_fixed_point(band, i, end):
     gaits, sign = band[end], (-1.0, 1.0)[end]
-    far, near = (ReturnMap(RIG._replace(k=KS[i], b=float(gaits.values[i]) * (1.0 + sign * part))).fixed_point()
-                 for part in (1e-2, 2.5e-3))
+    far, near = (
+        ReturnMap(RIG._replace(k=KS[i], b=float(gaits.values[i]) * (1.0 + sign * part))).fixed_point()
+        for part in (1e-2, 2.5e-3)
+    )
     assert far.stable
     assert near.stable
     # 1 − μ shrinks as the root of what is left.
@@ -136,6 +139,7 @@ def test_a_pair_without_a_limit_cycle_has_no_fold():
 
 # Verdicts
 
+
 def test_what_given_starts_come_to_agrees_with_the_fold(band):
     rigs = spread(RIG, 3, {'k': KS})
     states = np.repeat(starts(RIG, PHASES)[None], 3, axis=0)
@@ -162,6 +166,7 @@ def test_starts_are_those_of_the_return_map():
 
 
 # Energy
+
 
 def test_in_the_band_strikes_and_damper_take_more_than_the_slope_gives():
     rig = RIG._replace(b=0.8).resolved()

@@ -51,6 +51,7 @@ def one_by_one(monkeypatch):
 
 # What is computed
 
+
 def test_the_papers_sweep_is_the_default():
     sweep = papers_sweep()
     assert sweep.shape == (50, 50)
@@ -88,7 +89,7 @@ def test_the_result_does_not_depend_on_the_blocks(size):
     for block in blocks(SMALL, size):
         for name, value in compute(SMALL, block).items():
             same = whole[name][block]
-            same = same[..., :value.shape[-1]] if name.startswith('section_') else same
+            same = same[..., : value.shape[-1]] if name.startswith('section_') else same
             assert np.ascontiguousarray(same).tobytes() == np.ascontiguousarray(value).tobytes(), name
 
 
@@ -112,36 +113,59 @@ def test_a_sweep_survives_its_text():
 
 # Refusals
 
-@pytest.mark.parametrize(('text', 'name', 'values'), [
-    ('k:1:3:3', 'k', (1.0, 2.0, 3.0)), ('b:1:100:3:log', 'b', (1.0, 10.0, 100.0)),
-    ('rear.mass:2:2:1:lin', 'rear.mass', (2.0,))])
+
+@pytest.mark.parametrize(
+    ('text', 'name', 'values'),
+    [
+        ('k:1:3:3', 'k', (1.0, 2.0, 3.0)),
+        ('b:1:100:3:log', 'b', (1.0, 10.0, 100.0)),
+        ('rear.mass:2:2:1:lin', 'rear.mass', (2.0,)),
+    ],
+)
 def test_an_axis_is_read(text, name, values):
     axis = Axis.parse(text)
     assert axis.name == name
     assert axis.values == pytest.approx(values)
 
 
-@pytest.mark.parametrize(('text', 'message'), [
-    ('k', 'an axis is NAME:LOW:HIGH:COUNT'), ('k:1:2', 'an axis is'), ('k:1:2:0', 'an axis is'),
-    ('k:1:x:3', 'an axis is'), ('k:1:inf:3', 'an axis is'), ('k:1:2:3:cubic', 'an axis is'),
-    ('k:0:1:3:log', 'needs LOW and HIGH > 0'),
-    ('frontmass:1:2:3', "'frontmass' is no parameter .* did you mean front.mass"),
-    ('zzz:1:2:3', 'there are front.length')])
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('k', 'an axis is NAME:LOW:HIGH:COUNT'),
+        ('k:1:2', 'an axis is'),
+        ('k:1:2:0', 'an axis is'),
+        ('k:1:x:3', 'an axis is'),
+        ('k:1:inf:3', 'an axis is'),
+        ('k:1:2:3:cubic', 'an axis is'),
+        ('k:0:1:3:log', 'needs LOW and HIGH > 0'),
+        ('frontmass:1:2:3', "'frontmass' is no parameter .* did you mean front.mass"),
+        ('zzz:1:2:3', 'there are front.length'),
+    ],
+)
 def test_what_is_no_axis_is_refused(text, message):
     with pytest.raises(ValueError, match=message):
         Axis.parse(text)
 
 
-@pytest.mark.parametrize(('change', 'message'), [
-    ({'seconds': 0.0}, 'seconds and band'), ({'band': math.nan}, 'seconds and band'),
-    ({'phases': ()}, 'phases must be'), ({'phases': (1.0,)}, 'phases must be'),
-    ({'x': Axis('b', (1.0,))}, 'both axes set b'),
-    ({'x': Axis('slope', (0.1,)), 'y': Axis('slope_deg', (1.0,))}, 'both axes set slope'),
-    ({'x': Axis('mass', (1.0,)), 'y': Axis('rear.mass', (1.0,))}, r'both axes set rear\.mass'),
-    ({'x': Axis('k', ())}, 'k must have values'), ({'x': Axis('k', (math.nan,))}, 'all finite'),
-    ({'x': Axis('k', (1.0, 1.0))}, 'k has a value twice'), ({'x': Axis('k', (1.0, -1.0))}, 'k must be ≥ 0'),
-    ({'y': Axis('b', (1.0, 1e9))}, 'b must be ≤'), ({'x': Axis('slope_deg', (2.0, 0.5))}, 'too gentle'),
-    ({'x': Axis('none', (1.0,))}, 'no parameter')])
+@pytest.mark.parametrize(
+    ('change', 'message'),
+    [
+        ({'seconds': 0.0}, 'seconds and band'),
+        ({'band': math.nan}, 'seconds and band'),
+        ({'phases': ()}, 'phases must be'),
+        ({'phases': (1.0,)}, 'phases must be'),
+        ({'x': Axis('b', (1.0,))}, 'both axes set b'),
+        ({'x': Axis('slope', (0.1,)), 'y': Axis('slope_deg', (1.0,))}, 'both axes set slope'),
+        ({'x': Axis('mass', (1.0,)), 'y': Axis('rear.mass', (1.0,))}, r'both axes set rear\.mass'),
+        ({'x': Axis('k', ())}, 'k must have values'),
+        ({'x': Axis('k', (math.nan,))}, 'all finite'),
+        ({'x': Axis('k', (1.0, 1.0))}, 'k has a value twice'),
+        ({'x': Axis('k', (1.0, -1.0))}, 'k must be ≥ 0'),
+        ({'y': Axis('b', (1.0, 1e9))}, 'b must be ≤'),
+        ({'x': Axis('slope_deg', (2.0, 0.5))}, 'too gentle'),
+        ({'x': Axis('none', (1.0,))}, 'no parameter'),
+    ],
+)
 def test_an_impossible_sweep_is_refused_before_it_starts(tmp_path, change, message):
     with pytest.raises(ValueError, match=message):
         run(SMALL._replace(**change), tmp_path / 'sweep.nc')
@@ -154,6 +178,7 @@ def test_every_parameter_of_a_rig_can_be_an_axis():
 
 
 # The file
+
 
 def test_the_file_holds_what_was_computed(tmp_path):
     path, reports = tmp_path / 'sweep.nc', []
@@ -200,6 +225,7 @@ def test_dotted_names_make_axes(tmp_path):
 
 # Interruptions
 
+
 class Stop(Exception):
     pass
 
@@ -212,6 +238,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path, one_by_one):
     def stop_half_way(progress):
         if progress.points >= 6:
             raise Stop
+
     reports = []
     with pytest.raises(Stop):
         run(SMALL, tmp_path / 'parts.nc', stop_half_way)
@@ -227,6 +254,7 @@ def test_blocks_keep_their_size_when_it_goes_on(tmp_path, monkeypatch):
     def stop_soon(progress):
         if progress.points:
             raise Stop
+
     for size in (2, 100):
         monkeypatch.setattr('dcdrw_sim.study.sweep_run.block_size', lambda sweep, size=size: size)
         if size == 2:

@@ -43,27 +43,30 @@ def judged(*arguments, capacity=50, **options):
 OUT, IN = [9.0, 7.0, 5.0, 3.0], [0.9, 0.5, -0.3, 0.2, 0.1]
 
 
-@pytest.mark.parametrize(('theta2', 'options', 'verdict'), [
-    (OUT + IN, {}, Verdict.SETTLES),
-    (IN[:1] * HOLD, {}, Verdict.SETTLES),
-    (OUT + IN[1:], {}, Verdict.ENTERS),  # not long enough
-    ([*OUT, *IN, 1.1], {}, Verdict.ENTERS),
-    ([*OUT, -3.0, -4.0, -3.5, -3.2, -3.3], {}, Verdict.UNDECIDED),  # across the band, but never seen within
-    ([4.0] * (HOLD + 1), {}, Verdict.ELSEWHERE),
-    ([*OUT, *IN, *[1.2] * (HOLD + 1)], {}, Verdict.ELSEWHERE),
-    ([15.0, -15.0] * HOLD, {}, Verdict.ELSEWHERE),  # both strike at one instant: before or after, by a hair
-    (OUT + IN, {'rocked': 6}, Verdict.STALLS),
-    ([9.0, *OUT, *IN], {'rocked': 1}, Verdict.SETTLES),  # long ago
-    (OUT + IN, {'late': 3.5}, Verdict.STALLS),
-    (OUT + IN, {'end': End.STALLED}, Verdict.STALLS),
-    (OUT + IN, {'end': End.STANDING}, Verdict.STANDS),
-    (OUT + IN, {'end': End.FALLEN}, Verdict.FALLS),
-    (OUT + IN, {'end': End.HUBS_MET}, Verdict.COLLIDES),
-    (OUT + IN, {'end': TOO_FAST}, Verdict.RACES),
-    (OUT + IN, {'end': End.STRIKES, 'late': 0.0}, Verdict.SETTLES),
-    ([0.0], {}, Verdict.ENTERS),
-    ([9.0], {}, Verdict.UNDECIDED),
-])
+@pytest.mark.parametrize(
+    ('theta2', 'options', 'verdict'),
+    [
+        (OUT + IN, {}, Verdict.SETTLES),
+        (IN[:1] * HOLD, {}, Verdict.SETTLES),
+        (OUT + IN[1:], {}, Verdict.ENTERS),  # not long enough
+        ([*OUT, *IN, 1.1], {}, Verdict.ENTERS),
+        ([*OUT, -3.0, -4.0, -3.5, -3.2, -3.3], {}, Verdict.UNDECIDED),  # across the band, but never seen within
+        ([4.0] * (HOLD + 1), {}, Verdict.ELSEWHERE),
+        ([*OUT, *IN, *[1.2] * (HOLD + 1)], {}, Verdict.ELSEWHERE),
+        ([15.0, -15.0] * HOLD, {}, Verdict.ELSEWHERE),  # both strike at one instant: before or after, by a hair
+        (OUT + IN, {'rocked': 6}, Verdict.STALLS),
+        ([9.0, *OUT, *IN], {'rocked': 1}, Verdict.SETTLES),  # long ago
+        (OUT + IN, {'late': 3.5}, Verdict.STALLS),
+        (OUT + IN, {'end': End.STALLED}, Verdict.STALLS),
+        (OUT + IN, {'end': End.STANDING}, Verdict.STANDS),
+        (OUT + IN, {'end': End.FALLEN}, Verdict.FALLS),
+        (OUT + IN, {'end': End.HUBS_MET}, Verdict.COLLIDES),
+        (OUT + IN, {'end': TOO_FAST}, Verdict.RACES),
+        (OUT + IN, {'end': End.STRIKES, 'late': 0.0}, Verdict.SETTLES),
+        ([0.0], {}, Verdict.ENTERS),
+        ([9.0], {}, Verdict.UNDECIDED),
+    ],
+)
 def test_verdict(theta2, options, verdict):
     assert Verdict(judged(theta2, **options)[0].verdict) is verdict
 
@@ -83,6 +86,7 @@ def test_a_motion_of_no_strike_is_undecided():
 
 
 # The paper's condition
+
 
 def test_enters_is_told_whatever_comes_after():
     for end in (End.TIME, End.STANDING):
@@ -116,6 +120,7 @@ def test_a_wider_band_is_entered_no_later():
 
 # Sections
 
+
 def test_sections_are_those_of_the_return_map():
     return_map = ReturnMap(SWEEP)
     start = return_map.at_phase(0.3)
@@ -125,7 +130,8 @@ def test_sections_are_those_of_the_return_map():
     states = return_map.iterate(start, count - 1)
     assert count > 15
     assert np.column_stack([value[0, :count] for value in sections[1:]]) == pytest.approx(
-        return_map.raw(states), abs=1e-9)
+        return_map.raw(states), abs=1e-9
+    )
     assert np.isnan(sections.time[0, count:]).all()
     assert judgement.theta2[0] == sections.theta2[0, count - 1]
     assert judgement.slips[0] == judgement.step_difference[0] == 0
@@ -141,7 +147,8 @@ def test_a_slipped_step_is_told_and_lengthens_the_coupler():
     last = int(judgement.sections[0]) - 1
     state = State(SWEEP.front.alpha, 0.0, sections.theta2[0, last], 0.0)
     assert sections.coupler_length[0, last] == pytest.approx(
-        hub_distance(SWEEP, state, SWEEP.S0 + n * SWEEP.front.step_length), abs=1e-12)
+        hub_distance(SWEEP, state, SWEEP.S0 + n * SWEEP.front.step_length), abs=1e-12
+    )
 
 
 def test_what_there_is_no_room_for_is_still_judged():
@@ -153,20 +160,28 @@ def test_what_there_is_no_room_for_is_still_judged():
 
 # Real motions
 
+
 def test_verdicts_of_motions_that_are_known():
     start = (SWEEP.front.alpha, *ReturnMap(SWEEP).at_phase(0.3))
-    rigs = spread(SWEEP, 4, {'b': [0.15, 1.0, 0.0, 0.15], 'k': [5e-3, 5e-3, 0.0, 5e-3],
-                             'slope': [SWEEP.slope] * 3 + [-0.02]})
+    rigs = spread(
+        SWEEP, 4, {'b': [0.15, 1.0, 0.0, 0.15], 'k': [5e-3, 5e-3, 0.0, 5e-3], 'slope': [SWEEP.slope] * 3 + [-0.02]}
+    )
     judgement, _ = judge(run_pairs(rigs, [start] * 4, 200.0, 1000), rigs, 200)
     assert [*map(Verdict, judgement.verdict)] == [
-        Verdict.SETTLES, Verdict.STANDS, Verdict.ELSEWHERE, Verdict.STANDS]  # uncoupled wheels keep their phase
+        Verdict.SETTLES,
+        Verdict.STANDS,
+        Verdict.ELSEWHERE,
+        Verdict.STANDS,
+    ]  # uncoupled wheels keep their phase
 
 
 def test_a_wheel_that_rocks_when_time_is_over_has_stalled():
     ensemble = run_ensemble(GENTLE, [(-0.2, 0.1, 0.1, 1.4)], 4.0, 400)
     assert judge(ensemble, spread(GENTLE, 1, {}), 50)[0].verdict[0] == Verdict.STALLS
-    assert judge(run_ensemble(UNCOUPLED, [(-0.1, -1.5, 0.1, 1.4)], 6.0, 400), spread(GENTLE, 1, {}), 50)[
-        0].verdict[0] == Verdict.FALLS
+    assert (
+        judge(run_ensemble(UNCOUPLED, [(-0.1, -1.5, 0.1, 1.4)], 6.0, 400), spread(GENTLE, 1, {}), 50)[0].verdict[0]
+        == Verdict.FALLS
+    )
 
 
 @settings(max_examples=20, deadline=None)

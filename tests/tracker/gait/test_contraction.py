@@ -16,7 +16,7 @@ def test_the_ratio_is_found_wherever_the_fixed_point_is(ratio: float, fixed: flo
 
 def test_noise_does_not_pull_the_ratio_towards_zero() -> None:
     random = np.random.default_rng(1)
-    errors = [2.0 + 30.0 * 0.85**np.arange(20) + random.normal(0.0, 0.9, 20) for _ in range(200)]
+    errors = [2.0 + 30.0 * 0.85 ** np.arange(20) + random.normal(0.0, 0.9, 20) for _ in range(200)]
     ratios = [contraction(list(trial)) for trial in errors]
     assert np.nanmedian(ratios) == pytest.approx(0.85, abs=0.01)
 

@@ -9,25 +9,35 @@ from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams
 from dcdrw_tracker.gait.sync import SyncStatus
 
 STATUS = SyncStatus(
-    stamp_ns=1, phase=0.48, error=math.radians(-0.6), error_percent=-2.0, initial_phase=0.216, steps=12,
-    swing_percent=(-3.0, 2.5), contraction=0.9, cadence=CadenceStatus(200.0, 2, 3, 0.02),
+    stamp_ns=1,
+    phase=0.48,
+    error=math.radians(-0.6),
+    error_percent=-2.0,
+    initial_phase=0.216,
+    steps=12,
+    swing_percent=(-3.0, 2.5),
+    contraction=0.9,
+    cadence=CadenceStatus(200.0, 2, 3, 0.02),
 )
 NEVER = math.inf
 
 
-@pytest.mark.parametrize(('status', 'age', 'level', 'message'), [
-    (SyncStatus(), NEVER, Level.STALE, 'no data yet'),
-    (SyncStatus(), math.nan, Level.STALE, 'no data yet'),
-    (STATUS._replace(synchronized=True), 2.5, Level.STALE, 'stale: no sample for 2.5 s'),
-    (SyncStatus(), 2.5, Level.STALE, 'stale: no sample for 2.5 s'),
-    (SyncStatus(), 0.1, Level.OK, 'starting afresh'),
-    (STATUS._replace(stalled=('rear',)), 0.0, Level.ERROR, 'stalled: the rear wheel'),
-    (STATUS._replace(stalled=('front', 'rear')), 0.0, Level.ERROR, 'stalled: the front and the rear wheel'),
-    (STATUS._replace(slipped=True, step_difference=2), 0.0, Level.WARN, 'slipped a step: n = 2'),
-    (STATUS._replace(lost=True), 0.0, Level.WARN, 'lost synchronization: error -2.0 %'),
-    (STATUS._replace(synchronized=True, steps_to_synchronization=7), 0.0, Level.OK, 'synchronized after 7 steps'),
-    (STATUS, 0.0, Level.OK, 'converging: error -2.0 %'),
-])
+@pytest.mark.parametrize(
+    ('status', 'age', 'level', 'message'),
+    [
+        (SyncStatus(), NEVER, Level.STALE, 'no data yet'),
+        (SyncStatus(), math.nan, Level.STALE, 'no data yet'),
+        (STATUS._replace(synchronized=True), 2.5, Level.STALE, 'stale: no sample for 2.5 s'),
+        (SyncStatus(), 2.5, Level.STALE, 'stale: no sample for 2.5 s'),
+        (SyncStatus(), 0.1, Level.OK, 'starting afresh'),
+        (STATUS._replace(stalled=('rear',)), 0.0, Level.ERROR, 'stalled: the rear wheel'),
+        (STATUS._replace(stalled=('front', 'rear')), 0.0, Level.ERROR, 'stalled: the front and the rear wheel'),
+        (STATUS._replace(slipped=True, step_difference=2), 0.0, Level.WARN, 'slipped a step: n = 2'),
+        (STATUS._replace(lost=True), 0.0, Level.WARN, 'lost synchronization: error -2.0 %'),
+        (STATUS._replace(synchronized=True, steps_to_synchronization=7), 0.0, Level.OK, 'synchronized after 7 steps'),
+        (STATUS, 0.0, Level.OK, 'converging: error -2.0 %'),
+    ],
+)
 def test_each_state_has_its_own_level_and_message(status: SyncStatus, age: float, level: Level, message: str) -> None:
     diagnosis = diagnose_sync(status, age, 1.0)
     assert diagnosis.level == level
@@ -36,10 +46,19 @@ def test_each_state_has_its_own_level_and_message(status: SyncStatus, age: float
 
 def test_the_keys_of_the_contract_are_there() -> None:
     values = diagnose_sync(STATUS, 0.01, 1.0).values
-    assert {key: values[key] for key in (
-        'phase', 'error', 'n', 'steps to synchronization', 'rate in', 'gaps', 'age of the last sample',
-        'per-step convergence ratio',
-    )} == {
+    assert {
+        key: values[key]
+        for key in (
+            'phase',
+            'error',
+            'n',
+            'steps to synchronization',
+            'rate in',
+            'gaps',
+            'age of the last sample',
+            'per-step convergence ratio',
+        )
+    } == {
         'phase': '48.0 % of a step, 24.0 % of a stride',
         'error': '-2.0 % (-0.60°)',
         'n': '0',

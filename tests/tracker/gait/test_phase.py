@@ -26,6 +26,7 @@ def run(
 
 def wrap(samples: list[JointSample], low: float = -math.pi, turns: int = 0) -> list[JointSample]:
     """The same rotations within a turn from `low`."""
+
     def wrapped(turn: Turn) -> Turn:
         return Turn((turn.angle - low) % math.tau + low, turn.rate)
 
@@ -41,6 +42,7 @@ def shift(samples: list[JointSample], ns: int = 0, front: float = 0.0, rear: flo
 
 def same(one: list[PhaseSample], other: list[PhaseSample]) -> bool:
     """Whether two runs tell the same, but for rounding and the stamps' origin."""
+
     def numbers(phases: list[PhaseSample]) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
         return np.array([(p.front.angle, p.rear.angle, p.phi.angle, p.phi.rate, p.step_difference) for p in phases])
 
@@ -48,6 +50,7 @@ def same(one: list[PhaseSample], other: list[PhaseSample]) -> bool:
 
 
 # --- the truth -----------------------------------------------------------------------------------------------------
+
 
 def test_a_clean_walk_is_followed_exactly() -> None:
     truth = walk(8.0)
@@ -87,7 +90,8 @@ def test_wheels_of_unequal_spokes_each_keep_their_own_step() -> None:
     phases, _, status = run(samples, params)
     turned = samples[-1].front.angle
     assert (status.front_steps, status.rear_steps) == (
-        math.floor(turned / (math.pi / 6) + 0.5), math.floor(turned / (math.pi / 4) + 0.5)
+        math.floor(turned / (math.pi / 6) + 0.5),
+        math.floor(turned / (math.pi / 4) + 0.5),
     )
     phase = (turned / (math.pi / 6) - turned / (math.pi / 4)) % 1
     assert phases[-1].phi.angle == pytest.approx(phase * (math.pi / 12 + math.pi / 8))
@@ -103,6 +107,7 @@ def test_a_missing_speed_is_found_from_the_rotations() -> None:
 
 # --- invariants ----------------------------------------------------------------------------------------------------
 
+
 @settings(max_examples=20, deadline=None)
 @given(st.floats(0.05, 0.95), st.integers(-5, 5), st.integers(-5, 5))
 def test_whole_turns_of_a_wheel_change_nothing(p0: float, front: int, rear: int) -> None:
@@ -111,7 +116,7 @@ def test_whole_turns_of_a_wheel_change_nothing(p0: float, front: int, rear: int)
 
 
 @settings(max_examples=20, deadline=None)
-@given(st.floats(0.05, 0.95), st.integers(-10**18, 10**18))
+@given(st.floats(0.05, 0.95), st.integers(-(10**18), 10**18))
 def test_a_common_time_shift_changes_nothing(p0: float, ns: int) -> None:
     samples = walk(3.0, 100.0, p0).samples()
     shifted = run(shift(samples, ns))
@@ -150,6 +155,7 @@ def test_swapping_equal_wheels_mirrors_the_phase(p0: float) -> None:
 
 # --- gaps ----------------------------------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize('seconds', [0.3, 1.0, 3.0, 5.0, 20.0])
 @pytest.mark.parametrize('wrapped', [False, True])
 def test_a_gap_loses_no_steps_and_says_when_it_may_have(seconds: float, wrapped: bool) -> None:
@@ -176,16 +182,20 @@ def test_an_unbounded_wheel_that_stops_in_a_gap_is_not_turned() -> None:
 
 # --- what is refused -----------------------------------------------------------------------------------------------
 
-@pytest.mark.parametrize(('why', 'spoil'), [
-    ('not finite', lambda good: good._replace(front=Turn(math.nan, 1.0))),
-    ('not finite', lambda good: good._replace(rear=Turn(math.inf, 1.0))),
-    ('not finite', lambda good: good._replace(rear=Turn(1e300, 1.0))),
-    ('repeated', lambda good: good._replace(stamp_ns=good.stamp_ns - 5_000_000)),
-    ('reversed', lambda good: good._replace(stamp_ns=good.stamp_ns - 20_000_000)),
-    ('reversed', lambda good: good._replace(stamp_ns=good.stamp_ns - 20 * SECOND)),
-    ('future', lambda good: good._replace(stamp_ns=good.stamp_ns + SECOND)),
-    ('outlier', lambda good: good._replace(front=Turn(good.front.angle + 0.7, 1.0))),
-])
+
+@pytest.mark.parametrize(
+    ('why', 'spoil'),
+    [
+        ('not finite', lambda good: good._replace(front=Turn(math.nan, 1.0))),
+        ('not finite', lambda good: good._replace(rear=Turn(math.inf, 1.0))),
+        ('not finite', lambda good: good._replace(rear=Turn(1e300, 1.0))),
+        ('repeated', lambda good: good._replace(stamp_ns=good.stamp_ns - 5_000_000)),
+        ('reversed', lambda good: good._replace(stamp_ns=good.stamp_ns - 20_000_000)),
+        ('reversed', lambda good: good._replace(stamp_ns=good.stamp_ns - 20 * SECOND)),
+        ('future', lambda good: good._replace(stamp_ns=good.stamp_ns + SECOND)),
+        ('outlier', lambda good: good._replace(front=Turn(good.front.angle + 0.7, 1.0))),
+    ],
+)
 def test_a_bad_sample_is_refused_and_counted_and_changes_nothing(why: str, spoil) -> None:  # type: ignore[no-untyped-def]
     samples = walk(2.0).samples()
     estimator, clean = PhaseEstimator(PhaseParams()), PhaseEstimator(PhaseParams())
@@ -213,9 +223,17 @@ TURNS = st.builds(Turn, st.floats(), st.floats())
 
 
 @settings(max_examples=100, deadline=None)
-@given(st.lists(st.builds(
-    JointSample, st.integers(-2**63, 2**63), TURNS, TURNS,
-), max_size=40))
+@given(
+    st.lists(
+        st.builds(
+            JointSample,
+            st.integers(-(2**63), 2**63),
+            TURNS,
+            TURNS,
+        ),
+        max_size=40,
+    )
+)
 def test_no_sample_whatever_breaks_the_estimator(samples: list[JointSample]) -> None:
     phases, _, status = run(samples)
     assert status.accepted + sum(status.refused.values()) >= len(samples)
@@ -226,28 +244,33 @@ def test_no_sample_whatever_breaks_the_estimator(samples: list[JointSample]) -> 
 
 # --- restarts ------------------------------------------------------------------------------------------------------
 
+
 def after(first: list[JointSample], then: list[JointSample], pause_ns: int) -> list[JointSample]:
     """Two walks on end; the second's stamps begin `pause_ns` after (before, where negative) the first's end."""
     return first + shift(then, first[-1].stamp_ns + pause_ns - then[0].stamp_ns)
 
 
-@pytest.mark.parametrize('pause_ns', [
-    pytest.param(-5 * SECOND, id='a recording loops'),
-    pytest.param(5_000_000, id='the simulator is reset'),
-    pytest.param(3 * SECOND, id='the simulator is killed and started again'),
-])
+@pytest.mark.parametrize(
+    'pause_ns',
+    [
+        pytest.param(-5 * SECOND, id='a recording loops'),
+        pytest.param(5_000_000, id='the simulator is reset'),
+        pytest.param(3 * SECOND, id='the simulator is killed and started again'),
+    ],
+)
 @pytest.mark.parametrize('noise_deg', [0.0, 0.2])
 def test_a_restart_of_the_source_counts_afresh_and_loses_no_strike(pause_ns: int, noise_deg: float) -> None:
     first, second = walk(5.0).samples(noise_deg, 1), walk(4.0, p0=0.8).samples(noise_deg, 2)
     phases, falls, status = run(after(first, second, pause_ns))
     alone, falls_alone, _ = run(second)
     assert status.restarts == 1
-    assert same(phases[-len(second) + 4:], alone[4:])
+    assert same(phases[-len(second) + 4 :], alone[4:])
+
     def order(falls: list[Footfall]) -> list[tuple[str, int]]:
         return [(fall.wheel, fall.steps) for fall in falls]
 
-    assert order(falls[-len(falls_alone):]) == order(falls_alone)
-    assert [phase.restarts for phase in phases[-len(second) + 3:]] == [0] + [1] * (len(second) - 4)
+    assert order(falls[-len(falls_alone) :]) == order(falls_alone)
+    assert [phase.restarts for phase in phases[-len(second) + 3 :]] == [0] + [1] * (len(second) - 4)
     assert not status.n_uncertain
 
 
@@ -259,7 +282,7 @@ def test_a_new_run_of_the_source_counts_afresh_at_once() -> None:
     alone, falls_alone, _ = run(marked[600:])
     assert [phase.restarts for phase in phases] == [0] * 600 + [1] * 600
     assert same(phases[600:], alone)
-    assert falls[-len(falls_alone):] == falls_alone
+    assert falls[-len(falls_alone) :] == falls_alone
     assert (status.restarts, status.accepted) == (1, len(samples))
     assert phases[600].step_difference == 0
 

@@ -2,11 +2,14 @@
 
 import math
 
+import pytest
 from sensor_msgs.msg import JointState
 
 from dcdrw_msgs_py.messages import PhaseSampleReader, footfall, to_stamp
 from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, JOINT_STATES, PHASE_STATE, PHI, STEP_DIFFERENCE
 from tests.bench import Bench
+
+pytestmark = pytest.mark.processes
 
 ALPHA = math.pi / 12
 SPEED = 1.0

@@ -118,7 +118,7 @@ def test_the_swing_is_that_of_the_last_whole_step() -> None:
 
 
 @settings(max_examples=10, deadline=None)
-@given(st.floats(0.05, 0.95), st.integers(-10**17, 10**17))
+@given(st.floats(0.05, 0.95), st.integers(-(10**17), 10**17))
 def test_a_common_time_shift_changes_nothing(p0: float, ns: int) -> None:
     samples = phases(4.0, p0)
     one, other = run(samples)[0].status(), run(shift(samples, ns))[0].status()
@@ -127,6 +127,7 @@ def test_a_common_time_shift_changes_nothing(p0: float, ns: int) -> None:
 
 
 # --- trouble -------------------------------------------------------------------------------------------------------
+
 
 def test_a_wheel_that_strikes_twice_in_a_row_has_slipped_a_step() -> None:
     monitor, _ = run(phases(20.0, p0=0.216, p1=1.4, settle=3.0))
@@ -158,18 +159,21 @@ def test_a_pair_that_stands_still_within_the_band_loses_synchronization() -> Non
     assert (status.stalled, status.synchronized, status.lost, status.restarts) == (('front', 'rear'), False, True, 0)
 
 
-@pytest.mark.parametrize(('pause_ns', 'restarts'), [
-    pytest.param(-20 * SECOND, 0, id='a recording loops'),
-    pytest.param(-20 * SECOND, 1, id='a recording loops, and the estimator says so'),
-    pytest.param(0, 1, id='the simulator is reset'),
-    pytest.param(3 * SECOND, 0, id='the estimator is killed and started again'),
-    pytest.param(3 * SECOND, 1, id='the simulator is killed and started again'),
-])
+@pytest.mark.parametrize(
+    ('pause_ns', 'restarts'),
+    [
+        pytest.param(-20 * SECOND, 0, id='a recording loops'),
+        pytest.param(-20 * SECOND, 1, id='a recording loops, and the estimator says so'),
+        pytest.param(0, 1, id='the simulator is reset'),
+        pytest.param(3 * SECOND, 0, id='the estimator is killed and started again'),
+        pytest.param(3 * SECOND, 1, id='the simulator is killed and started again'),
+    ],
+)
 def test_a_restart_starts_afresh_and_is_never_falsely_synchronized(pause_ns: int, restarts: int) -> None:
     second = shift(phases(12.0, p0=0.3), LENGTH + pause_ns, restarts)
     monitor, syncs = run(SETTLED + second)
     alone, syncs_alone = run(second)
-    assert syncs[len(SETTLED):] == syncs_alone
+    assert syncs[len(SETTLED) :] == syncs_alone
     status = monitor.status()
     assert status.restarts == 1
     assert status._replace(restarts=0, cadence=alone.status().cadence) == alone.status()
@@ -207,9 +211,20 @@ TURNS = st.builds(Turn, st.floats(), st.floats())
 
 
 @settings(max_examples=100, deadline=None)
-@given(st.lists(st.builds(
-    PhaseSample, st.integers(-2**63, 2**63), TURNS, TURNS, TURNS, st.integers(-2**31, 2**31), st.integers(0, 2),
-), max_size=40))
+@given(
+    st.lists(
+        st.builds(
+            PhaseSample,
+            st.integers(-(2**63), 2**63),
+            TURNS,
+            TURNS,
+            TURNS,
+            st.integers(-(2**31), 2**31),
+            st.integers(0, 2),
+        ),
+        max_size=40,
+    )
+)
 def test_no_sample_whatever_breaks_the_monitor(samples: list[PhaseSample]) -> None:
     monitor, syncs = run(samples)
     assert all(-50.0 <= sync.error_percent < 50.0 for sync in syncs)

@@ -2,6 +2,7 @@
 
 import math
 
+import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
@@ -9,6 +10,8 @@ from dcdrw_msgs_py.messages import PhaseSampleWriter
 from dcdrw_msgs_py.samples import PhaseSample, Turn
 from dcdrw_msgs_py.topics import DIAGNOSTICS, PHASE_STATE, SYNC_ERROR, SYNC_ERROR_PERCENT, SYNCHRONIZED
 from tests.bench import Bench
+
+pytestmark = pytest.mark.processes
 
 ALPHA = math.pi / 12
 SPEED = 1.0
@@ -22,7 +25,8 @@ def phase_message(bench: Bench, k: int, phase: float):
     turns = [Turn(psi + SPEED * k / RATE - cell * 2 * ALPHA, SPEED) for psi, cell in zip(start, cells, strict=True)]
     stamp = bench.start_ns + k * 1_000_000_000 // RATE
     return PhaseSampleWriter().write(
-        PhaseSample(stamp, turns[0], turns[1], Turn(phase * 2 * ALPHA, 0.0), cells[0] - cells[1] - 1))
+        PhaseSample(stamp, turns[0], turns[1], Turn(phase * 2 * ALPHA, 0.0), cells[0] - cells[1] - 1)
+    )
 
 
 def drive(bench: Bench, phase: float, count: int) -> None:
@@ -72,8 +76,16 @@ def test_diagnosis_has_the_figures_of_the_contract(bench):
     drive(bench, 0.48, 3 * 52)
     bench.wait(lambda: len(diagnostics) >= 2, 'diagnostics')
     keys = {pair.key for pair in diagnostics[-1].status[0].values}
-    assert keys >= {'phase', 'error', 'n', 'steps to synchronization', 'rate in', 'gaps', 'age of the last sample',
-                    'per-step convergence ratio'}
+    assert keys >= {
+        'phase',
+        'error',
+        'n',
+        'steps to synchronization',
+        'rate in',
+        'gaps',
+        'age of the last sample',
+        'per-step convergence ratio',
+    }
 
 
 def test_band_changes_while_it_runs_and_nonsense_is_refused(bench):
@@ -81,8 +93,9 @@ def test_band_changes_while_it_runs_and_nonsense_is_refused(bench):
 
     def set_to(name: str, value: float):
         parameter = Parameter(name=name, value=ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value))
-        return bench.call(SetParameters, '/sync_monitor/set_parameters',
-                          SetParameters.Request(parameters=[parameter])).results[0]
+        return bench.call(
+            SetParameters, '/sync_monitor/set_parameters', SetParameters.Request(parameters=[parameter])
+        ).results[0]
 
     refused = set_to('band_percent', -1.0)
     assert not refused.successful

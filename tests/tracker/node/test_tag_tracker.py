@@ -115,10 +115,13 @@ def test_a_new_camera_info_goes_on_with_the_same_turns():
     assert track.status().angles.lost == 0
 
 
-@pytest.mark.parametrize(('tags', 'message'), [
-    (TagParams(front=TagGroup(ids=(1,))), 'tag 1 is mounted twice'),
-    (TagParams(family='36h12'), 'family must be one of'),
-])
+@pytest.mark.parametrize(
+    ('tags', 'message'),
+    [
+        (TagParams(front=TagGroup(ids=(1,))), 'tag 1 is mounted twice'),
+        (TagParams(family='36h12'), 'family must be one of'),
+    ],
+)
 def test_impossible_tags_are_refused(tags, message):
     with pytest.raises(ValueError, match=message):
         TagTracker(tags, PairViewParams(), TrackParams())
@@ -130,6 +133,7 @@ def test_an_unknown_detector_is_refused():
 
 
 # --- debug image ---------------------------------------------------------------------------------------------------
+
 
 def test_debug_image_shows_tags_and_stance_legs_where_they_are():
     track = tracker(camera_follows=True)
@@ -145,7 +149,7 @@ def test_debug_image_shows_tags_and_stance_legs_where_they_are():
         near = green[np.abs(green[:, 1] - x) < 80]
         assert near[:, 0].max() > 100
         edge = np.rint(0.5 * (one.corners[1] + one.corners[2])).astype(int)
-        colour = picture[edge[1] - 1:edge[1] + 2, edge[0] - 1:edge[0] + 2].reshape(-1, 3).tolist()
+        colour = picture[edge[1] - 1 : edge[1] + 2, edge[0] - 1 : edge[0] + 2].reshape(-1, 3).tolist()
         if one.id == 0:
             assert list(FRONT_COLOUR) in colour
 
@@ -159,6 +163,7 @@ def test_debug_image_of_a_frame_without_tags_is_the_frame():
 
 # --- what it says --------------------------------------------------------------------------------------------------
 
+
 def said(track, tags, count=12):
     picture = draw_tags(tags, 640, 360)
     for index in range(count):
@@ -170,11 +175,17 @@ def test_each_trouble_has_its_message():
     front, rear = (0, square(150, 180, 60)), (1, square(480, 180, 60))
     assert said(tracker(), [front, rear]) == (Level.OK, 'tracking both wheels')
     assert said(tracker(), []) == (
-        Level.WARN, 'no tag is seen; looking for tags 0, 1 (parameters front.ids, rear.ids, family)')
+        Level.WARN,
+        'no tag is seen; looking for tags 0, 1 (parameters front.ids, rear.ids, family)',
+    )
     assert said(tracker(), [front]) == (
-        Level.WARN, 'the rear wheel has never been seen; looking for tag 1 (parameter rear.ids)')
+        Level.WARN,
+        'the rear wheel has never been seen; looking for tag 1 (parameter rear.ids)',
+    )
     assert said(tracker(), [front, rear, (1, square(330, 100, 60))]) == (
-        Level.WARN, 'tag 1 is in the picture twice: take the other one away')
+        Level.WARN,
+        'tag 1 is in the picture twice: take the other one away',
+    )
 
 
 def test_a_wheel_that_is_not_seen_any_more_is_told():
@@ -185,14 +196,19 @@ def test_a_wheel_that_is_not_seen_any_more_is_told():
     for index in range(40):
         track.process(Frame(START_NS + (20 + index) * 33_333_333, picture))
     assert diagnose_tags(track.status(), FRESH)[:2] == (
-        Level.WARN, 'the front wheel is not seen any more; looking for tag 0 (parameter front.ids)')
+        Level.WARN,
+        'the front wheel is not seen any more; looking for tag 0 (parameter front.ids)',
+    )
 
 
-@pytest.mark.parametrize(('source', 'level', 'message'), [
-    (SourceStatus(math.inf, waiting='nobody publishes /image_raw'), Level.STALE, 'nobody publishes /image_raw'),
-    (SourceStatus(2.0), Level.STALE, 'stale: no frames'),
-    (SourceStatus(0.0, problem='no camera_info has come'), Level.ERROR, 'no camera_info has come'),
-    (FRESH, Level.WARN, 'the front wheel is not tracked yet'),
-])
+@pytest.mark.parametrize(
+    ('source', 'level', 'message'),
+    [
+        (SourceStatus(math.inf, waiting='nobody publishes /image_raw'), Level.STALE, 'nobody publishes /image_raw'),
+        (SourceStatus(2.0), Level.STALE, 'stale: no frames'),
+        (SourceStatus(0.0, problem='no camera_info has come'), Level.ERROR, 'no camera_info has come'),
+        (FRESH, Level.WARN, 'the front wheel is not tracked yet'),
+    ],
+)
 def test_the_source_is_judged_first(source, level, message):
     assert diagnose_poses(WheelAngles(TrackParams()).status(), source)[:2] == (level, message)

@@ -29,6 +29,8 @@ from dcdrw_msgs_py.topics import (
 )
 from tests.bench import Bench
 
+pytestmark = pytest.mark.processes
+
 CAMERA = pinhole(640, 360, 60.0)
 PERIOD_NS = 33_333_333
 SPEED = 0.5
@@ -142,7 +144,8 @@ def test_each_trouble_has_one_message_and_tracking_goes_on_after_it(bench):
     filming.until(lambda: len(joints) > count + 3, 'joint states after the trouble')
     after = JointSampleReader().read(joints[-1])
     assert after.front.angle - before.front.angle == pytest.approx(
-        SPEED * (after.stamp_ns - before.stamp_ns) * 1e-9, abs=0.02)
+        SPEED * (after.stamp_ns - before.stamp_ns) * 1e-9, abs=0.02
+    )
     lines = bench.output('tag_tracker').splitlines()
     for message in ('no camera_info has come', 'calibrated for', 'no tag is seen', 'rear wheel has never been seen'):
         assert sum(message in line for line in lines) == 1  # not one per frame
@@ -187,8 +190,7 @@ def test_a_parameter_takes_effect_or_is_refused_while_it_runs(bench):
         return bench.call(SetParameters, '/tag_tracker/set_parameters', request).results[0]
 
     assert set_('slope', 0.02).successful
-    filming.until(lambda: abs(joints[-1].position[0] - 0.28) < 0.002, 'the rotation from another normal',
-                  turned=0.3)
+    filming.until(lambda: abs(joints[-1].position[0] - 0.28) < 0.002, 'the rotation from another normal', turned=0.3)
     refused = set_('max_jump_deg', 90.0)
     assert not refused.successful
     assert 'max_jump_deg must be' in refused.reason
@@ -210,7 +212,7 @@ def test_a_video_file_is_tracked_whole_and_its_end_is_told(bench, truncated):
     film = write_film(bench, 90)
     if truncated:
         data = (bench.folder / 'film.avi').read_bytes()
-        (bench.folder / 'film.avi').write_bytes(data[:len(data) * 6 // 10])
+        (bench.folder / 'film.avi').write_bytes(data[: len(data) * 6 // 10])
     joints, diagnostics = bench.hear(JOINT_STATES), bench.hear(DIAGNOSTICS)
     settings = bench.folder / 'film.yaml'  # paths have capitals, which the bench's own parameters lose
     settings.write_text(f'/**: {{ros__parameters: {{source: {film}, camera: {bench.folder / "camera.yaml"}}}}}')
@@ -238,17 +240,22 @@ def test_a_camera_that_is_not_there_is_looked_for(bench):
     settings.write_text(f'/**: {{ros__parameters: {{source: /dev/video99, camera: {bench.folder / "camera.yaml"}}}}}')
     diagnostics = bench.hear(DIAGNOSTICS)
     process = bench.start('tag_tracker', '--params-file', str(settings))
-    bench.wait(lambda: said(diagnostics) == (
-        2, 'there is no camera at /dev/video99; it is looked for every 1 s'), 'a word on it')
+    bench.wait(
+        lambda: said(diagnostics) == (2, 'there is no camera at /dev/video99; it is looked for every 1 s'),
+        'a word on it',
+    )
     assert bench.end(process) == 0
 
 
-@pytest.mark.parametrize(('settings', 'message'), [
-    ({'source': 'trial.mp4'}, 'the source trial.mp4 needs the parameter camera: the camera_info file'),
-    ({'camera': '/nowhere.yaml'}, "camera: [Errno 2] No such file or directory: '/nowhere.yaml'"),
-    ({'detector': 'eyes'}, "detector must be aruco or apriltag, got 'eyes'"),
-    ({'rear__ids': '[0]'}, 'rear.ids: tag 0 is mounted twice'),
-])
+@pytest.mark.parametrize(
+    ('settings', 'message'),
+    [
+        ({'source': 'trial.mp4'}, 'the source trial.mp4 needs the parameter camera: the camera_info file'),
+        ({'camera': '/nowhere.yaml'}, "camera: [Errno 2] No such file or directory: '/nowhere.yaml'"),
+        ({'detector': 'eyes'}, "detector must be aruco or apriltag, got 'eyes'"),
+        ({'rear__ids': '[0]'}, 'rear.ids: tag 0 is mounted twice'),
+    ],
+)
 def test_what_cannot_work_ends_it_with_one_line(bench, settings, message):
     process = bench.start('tag_tracker', **settings)
     assert process.wait(20.0) == 2

@@ -38,6 +38,7 @@ def await_(condition):
 
 # --- files ---------------------------------------------------------------------------------------------------------
 
+
 def test_a_video_is_read_whole_with_its_own_stamps(tmp_path):
     video = VideoFile(write(tmp_path / 'a.avi'))
     frames = list(video.frames(5_000_000_000))
@@ -55,7 +56,7 @@ def test_a_given_frame_rate_takes_the_place_of_the_files(tmp_path):
 def test_a_truncated_video_is_told_and_what_is_there_is_read(tmp_path):
     whole = write(tmp_path / 'a.avi')
     data = whole.read_bytes()
-    whole.write_bytes(data[:len(data) * 6 // 10])
+    whole.write_bytes(data[: len(data) * 6 // 10])
     video = VideoFile(whole)
     assert 20 < len(list(video.frames())) < 60
     assert video.complaint == f'{whole} ends after {video.read} of 60 frames: it is truncated'
@@ -89,6 +90,7 @@ def test_a_camera_that_is_not_there_is_named():
 
 
 # --- threads -------------------------------------------------------------------------------------------------------
+
 
 def test_the_newest_item_is_kept_and_the_others_are_counted():
     slot = Slot()
@@ -159,7 +161,8 @@ def test_a_camera_that_is_unplugged_is_told_and_found_again(monkeypatch):
     assert states == [
         ('starting', True),
         ('the camera at /dev/video0 is gone; it is looked for every 0.05 s', False),
-        ('there is no camera at /dev/video0; it is looked for every 0.05 s', False)]
+        ('there is no camera at /dev/video0; it is looked for every 0.05 s', False),
+    ]
     assert (thread.state, thread.good, first.closed) == ('filming', True, True)
     thread.close()
     await_(lambda: second.closed)

@@ -71,11 +71,13 @@ PLACE = st.floats(-0.05, 0.05)
 @given(ZERO, ZERO, st.floats(-0.1, 0.1), PLACE, PLACE, st.floats(4.0, 9.0), st.floats(0.95, 1.05))
 def test_what_made_a_path_is_found(zero1, zero2, turn, x, y, steps, longer):
     """Whatever the zero within half a step, the slope, the place of the tags, and a length that was measured badly."""
-    found = calibrate(views(seen(FRONT, steps, zero1, turn, (x, y)), seen(REAR, steps, zero2, turn, (y, x))),
-                      FRONT._replace(length=FRONT.length * longer), REAR)
+    found = calibrate(
+        views(seen(FRONT, steps, zero1, turn, (x, y)), seen(REAR, steps, zero2, turn, (y, x))),
+        FRONT._replace(length=FRONT.length * longer),
+        REAR,
+    )
     assert found.turn.value == pytest.approx(turn, abs=1e-5)
-    for wheel, zero, shape, (tag_x, tag_y) in (
-            (found.front, zero1, FRONT, (x, y)), (found.rear, zero2, REAR, (y, x))):
+    for wheel, zero, shape, (tag_x, tag_y) in ((found.front, zero1, FRONT, (x, y)), (found.rear, zero2, REAR, (y, x))):
         assert wheel.zero.value == pytest.approx(zero, abs=1e-5)
         assert wheel.length.value == pytest.approx(shape.length, abs=1e-5)
         assert (wheel.tag_x.value, wheel.tag_y.value) == pytest.approx((tag_x, tag_y), abs=1e-4)
@@ -86,11 +88,23 @@ def test_errors_are_about_as_large_as_told():
     """Over many rolls with noise: none is far off by its own measure, and none boasts."""
     ratios = []
     for seed in range(12):
-        found = calibrate(views(seen(FRONT, 7, 0.1, 0.03, noise=0.002, seed=seed),
-                                seen(REAR, 7, -0.05, 0.03, noise=0.002, seed=100 + seed)), FRONT, REAR)
-        for (value, spread), truth in ((found.front.zero, 0.1), (found.rear.zero, -0.05), (found.turn, 0.03),
-                                       (found.front.length, FRONT.length), (found.rear.length, REAR.length),
-                                       (found.front.tag_x, 0.0), (found.rear.tag_y, 0.0)):
+        found = calibrate(
+            views(
+                seen(FRONT, 7, 0.1, 0.03, noise=0.002, seed=seed),
+                seen(REAR, 7, -0.05, 0.03, noise=0.002, seed=100 + seed),
+            ),
+            FRONT,
+            REAR,
+        )
+        for (value, spread), truth in (
+            (found.front.zero, 0.1),
+            (found.rear.zero, -0.05),
+            (found.turn, 0.03),
+            (found.front.length, FRONT.length),
+            (found.rear.length, REAR.length),
+            (found.front.tag_x, 0.0),
+            (found.rear.tag_y, 0.0),
+        ):
             ratios.append((value - truth) / spread)
     assert 0.5 < np.sqrt(np.mean(np.square(ratios))) < 2.0
 
@@ -135,14 +149,21 @@ def walked(shape, steps):
     return psi, hub + np.stack((np.zeros(len(psi)), 0.1 * np.sin(7.0 * psi)), axis=1)
 
 
-@pytest.mark.parametrize(('front', 'shape', 'message'), [
-    ((np.empty(0), np.empty((0, 2))), FRONT, 'the front wheel was not seen'),
-    (seen(FRONT, 2.5), FRONT, 'the front wheel takes 3 steps before the camera, but 4 are needed'),
-    (spun(FRONT, 8), FRONT, 'the hub of the front wheel travels 0.00 m in 8 steps, not about 4.00 m: the camera must'),
-    (seen(FRONT, 8), FRONT._replace(spokes=10), 'fits a wheel of 12 spokes, not 10 (front.spokes)'),
-    (walked(FRONT, 8), FRONT, 'does not travel as that of a rolling wheel: it is '),
-    (seen(FRONT, 8, turn=0.02), FRONT, 'the hubs do not travel along one slope: their directions are 1.1° apart'),
-])
+@pytest.mark.parametrize(
+    ('front', 'shape', 'message'),
+    [
+        ((np.empty(0), np.empty((0, 2))), FRONT, 'the front wheel was not seen'),
+        (seen(FRONT, 2.5), FRONT, 'the front wheel takes 3 steps before the camera, but 4 are needed'),
+        (
+            spun(FRONT, 8),
+            FRONT,
+            'the hub of the front wheel travels 0.00 m in 8 steps, not about 4.00 m: the camera must',
+        ),
+        (seen(FRONT, 8), FRONT._replace(spokes=10), 'fits a wheel of 12 spokes, not 10 (front.spokes)'),
+        (walked(FRONT, 8), FRONT, 'does not travel as that of a rolling wheel: it is '),
+        (seen(FRONT, 8, turn=0.02), FRONT, 'the hubs do not travel along one slope: their directions are 1.1° apart'),
+    ],
+)
 def test_what_is_no_roll_is_refused(front, shape, message):
     with pytest.raises(ValueError, match=re.escape(message)):
         calibrate(views(front, seen(REAR, 8)), shape, REAR)

@@ -30,8 +30,9 @@ def errors(side, blur, noise, count=10, **options):
     for seed in range(count):
         x, y, angle = np.random.default_rng(seed).uniform((118, 98, 0), (122, 102, 2 * np.pi))
         truth = square(x, y, side, angle)
-        [one] = TagDetector(ids=(seed,)).detect(draw([(seed, truth)], 240, 200, blur=blur, noise=noise, seed=seed,
-                                                     **options))
+        [one] = TagDetector(ids=(seed,)).detect(
+            draw([(seed, truth)], 240, 200, blur=blur, noise=noise, seed=seed, **options)
+        )
         ratio = turn(one.corners) / turn(truth)
         turns.append(np.degrees(np.angle(ratio)))
         sizes.append(abs(ratio) - 1.0)
@@ -51,10 +52,17 @@ def test_corners_go_clockwise_from_the_top_left_of_the_upright_tag(family, backe
     assert one.corners == pytest.approx(truth, abs=0.1)
 
 
-@pytest.mark.parametrize(('side', 'blur', 'noise', 'degrees', 'pixels'), [
-    (120, 0.7, 2, 0.02, 0.05), (40, 0.7, 2, 0.06, 0.05), (20, 0.5, 2, 0.2, 0.15),
-    (120, 2.0, 2, 0.03, 0.06), (40, 2.0, 2, 0.25, 0.5), (60, 0.7, 12, 0.1, 0.15),
-])
+@pytest.mark.parametrize(
+    ('side', 'blur', 'noise', 'degrees', 'pixels'),
+    [
+        (120, 0.7, 2, 0.02, 0.05),
+        (40, 0.7, 2, 0.06, 0.05),
+        (20, 0.5, 2, 0.2, 0.15),
+        (120, 2.0, 2, 0.03, 0.06),
+        (40, 2.0, 2, 0.25, 0.5),
+        (60, 0.7, 12, 0.1, 0.15),
+    ],
+)
 def test_turn_and_corners_are_exact_to_a_fraction_of_a_pixel(side, blur, noise, degrees, pixels):
     turns, squares, _ = errors(side, blur, noise)
     assert turns < degrees
@@ -76,8 +84,10 @@ def test_a_tag_is_found_in_an_oblique_view(squeeze):
         assert one.corners == pytest.approx(truth, abs=0.15)
 
 
-@pytest.mark.parametrize(('side', 'blur', 'noise', 'background'), [
-    (14, 0.5, 1, 110), (300, 1.0, 6, 110), (90, 4.0, 2, 110), (60, 1.0, 25, 110), (60, 1.0, 4, 230), (60, 1.0, 4, 20)])
+@pytest.mark.parametrize(
+    ('side', 'blur', 'noise', 'background'),
+    [(14, 0.5, 1, 110), (300, 1.0, 6, 110), (90, 4.0, 2, 110), (60, 1.0, 25, 110), (60, 1.0, 4, 230), (60, 1.0, 4, 20)],
+)
 def test_small_large_blurred_and_noisy_tags_are_found(side, blur, noise, background):
     size = max(200, 2 * side)
     truth = square(size / 2, size / 2, side, 0.4)
@@ -87,8 +97,11 @@ def test_small_large_blurred_and_noisy_tags_are_found(side, blur, noise, backgro
 
 
 def test_every_tag_of_a_full_picture_is_found_once():
-    tags = [(3 * row + column, square(60 + 110 * column, 60 + 110 * row, 30 + 12 * column, row + 0.3 * column))
-            for row in range(3) for column in range(3)]
+    tags = [
+        (3 * row + column, square(60 + 110 * column, 60 + 110 * row, 30 + 12 * column, row + 0.3 * column))
+        for row in range(3)
+        for column in range(3)
+    ]
     found = TagDetector().detect(draw(tags, 340, 340, blur=0.6, noise=2))
     assert sorted(one.id for one in found) == list(range(9))
     for one in found:
@@ -136,10 +149,13 @@ def test_an_unknown_backend_is_refused():
         TagDetector(backend='yolo')
 
 
-@pytest.mark.parametrize(('module', 'backend', 'message'), [
-    ('cv2', 'aruco', r"need OpenCV: apt install python3-opencv, or pip install 'dcdrw\[camera\]'"),
-    ('pupil_apriltags', 'apriltag', r"needs pupil-apriltags: pip install 'dcdrw\[apriltag\]'"),
-])
+@pytest.mark.parametrize(
+    ('module', 'backend', 'message'),
+    [
+        ('cv2', 'aruco', r"need OpenCV: apt install python3-opencv, or pip install 'dcdrw\[camera\]'"),
+        ('pupil_apriltags', 'apriltag', r"needs pupil-apriltags: pip install 'dcdrw\[apriltag\]'"),
+    ],
+)
 def test_a_library_that_is_missing_is_named_with_what_installs_it(module, backend, message, monkeypatch):
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(ValueError, match=message):

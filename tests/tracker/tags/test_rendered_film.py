@@ -19,16 +19,20 @@ SCENE, TAGS = SceneParams(), TagParams()
 
 def film(count: int) -> list[JointSample]:
     """A pair that rolls at a common pace, at 60 frames/s."""
-    return [JointSample(round(k / 60 * 1e9), Turn(0.02 * k - 0.2, 1.2), Turn(0.02 * k - 0.35, 1.2))
-            for k in range(count)]
+    return [
+        JointSample(round(k / 60 * 1e9), Turn(0.02 * k - 0.2, 1.2), Turn(0.02 * k - 0.35, 1.2)) for k in range(count)
+    ]
 
 
-@pytest.mark.parametrize(('side', 'view', 'blur', 'degrees'), [
-    (120.0, ViewParams(), 0.0, 0.1),
-    (40.0, ViewParams(k1=-0.25, k2=0.08), 0.0, 0.3),
-    (100.0, ViewParams(pan_deg=30.0), 2.0, 0.5),
-    (60.0, ViewParams(pan_deg=-45.0, height=2.0, roll_deg=4.0), 0.0, 0.3),
-])
+@pytest.mark.parametrize(
+    ('side', 'view', 'blur', 'degrees'),
+    [
+        (120.0, ViewParams(), 0.0, 0.1),
+        (40.0, ViewParams(k1=-0.25, k2=0.08), 0.0, 0.3),
+        (100.0, ViewParams(pan_deg=30.0), 2.0, 0.5),
+        (60.0, ViewParams(pan_deg=-45.0, height=2.0, roll_deg=4.0), 0.0, 0.3),
+    ],
+)
 def test_the_phase_is_within_the_figures_that_a_lab_is_promised(side, view, blur, degrees):
     camera = view.make_camera()
     view = view._replace(distance=SCENE.tag_plane + float(camera.matrix[0, 0]) * TAGS.size / side)

@@ -19,8 +19,13 @@ def places(frame: int, speed: float = 4.0) -> list[tuple[int, np.ndarray]]:
 
 
 def watch(one: TagFollower, frames, hidden=(), stray=()) -> list[Sighting]:
-    return [one.follow(draw([tag for tag in places(k) if tag[0] not in hidden] + list(stray), 520, 200, blur=0.6,
-                            noise=2, seed=k), k * FRAME_NS) for k in frames]
+    return [
+        one.follow(
+            draw([tag for tag in places(k) if tag[0] not in hidden] + list(stray), 520, 200, blur=0.6, noise=2, seed=k),
+            k * FRAME_NS,
+        )
+        for k in frames
+    ]
 
 
 def ids(sighting: Sighting) -> list[int]:

@@ -41,8 +41,16 @@ class Tripod(NamedTuple):
         points = np.stack((picture.real, -picture.imag, np.full(picture.shape, depth)), axis=-1)
         return self.camera.project(points @ self.rotation().T + (0.0, 0.0, self.distance))
 
-    def see(self, mount: Mount, psi: float, along: float, above: float = 0.0, depth: float = 0.0, noise: float = 0.0,
-            random=None) -> Detection:
+    def see(
+        self,
+        mount: Mount,
+        psi: float,
+        along: float,
+        above: float = 0.0,
+        depth: float = 0.0,
+        noise: float = 0.0,
+        random=None,
+    ) -> Detection:
         """A tag whose wheel has turned by ψ, its hub so far down the slope and above the middle of the picture."""
         picture = seen(corners(mount), psi, SLOPE) + seen((along, above), slope=SLOPE)
         pixels = self.pixels(picture, depth)
@@ -69,8 +77,16 @@ def walk(tripod, one, frames=80, noise=0.05, depth=0.1, seed=0):
     for k in range(frames):
         psi, along = 0.08 * k, 0.4 * tripod.distance * (k / frames - 0.5)
         truth = (psi, along + 0.3), (psi - 0.2, along - 0.2)
-        yield one.view(k, [tripod.see(FRONT, *truth[0], noise=noise, random=random),
-                           tripod.see(REAR, *truth[1], depth=depth, noise=noise, random=random)]), truth
+        yield (
+            one.view(
+                k,
+                [
+                    tripod.see(FRONT, *truth[0], noise=noise, random=random),
+                    tripod.see(REAR, *truth[1], depth=depth, noise=noise, random=random),
+                ],
+            ),
+            truth,
+        )
 
 
 def error(view, psi):

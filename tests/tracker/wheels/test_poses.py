@@ -49,12 +49,18 @@ def paired(poses, params=PoseParams()) -> list[PairView]:  # noqa: B008
 @settings(max_examples=50, deadline=None)
 @given(st.floats(-20, 20), st.floats(-math.pi, math.pi), st.sampled_from('xyz'), st.floats(-180, 180), st.booleans())
 def test_rotation_is_that_about_the_rigs_left_axis(psi, heading, axis, offset_deg, learned):
-    onto_z = {'x': Rotation.from_euler('y', -math.pi / 2), 'y': Rotation.from_euler('x', math.pi / 2),
-              'z': Rotation.identity()}[axis]
+    onto_z = {
+        'x': Rotation.from_euler('y', -math.pi / 2),
+        'y': Rotation.from_euler('x', math.pi / 2),
+        'z': Rotation.identity(),
+    }[axis]
     mounted = Rotation.from_euler('y', -math.radians(offset_deg)) * onto_z
     params = PoseParams(math.nan if learned else math.degrees(heading), axis, offset_deg, offset_deg)
-    poses = [(wheel, in_room(psi, x, stamp, heading, mounted)) for stamp in (10, 20)
-             for wheel, x in ((FRONT, 2.5), (REAR, 1.0))]
+    poses = [
+        (wheel, in_room(psi, x, stamp, heading, mounted))
+        for stamp in (10, 20)
+        for wheel, x in ((FRONT, 2.5), (REAR, 1.0))
+    ]
     view = paired(poses, params)[-1]
     for wheel, x in ((view.front, 2.5), (view.rear, 1.0)):
         assert math.remainder(wheel.rotation - psi, math.tau) == pytest.approx(0.0, abs=1e-9)
@@ -113,10 +119,13 @@ def test_a_stream_that_starts_anew_goes_on():
     assert len(views) > 2 * 240 - 60
 
 
-@pytest.mark.parametrize(('pose', 'message'), [
-    (PoseSample(0, (math.nan, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), 'is no number'),
-    (PoseSample(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)), 'is no unit quaternion'),
-])
+@pytest.mark.parametrize(
+    ('pose', 'message'),
+    [
+        (PoseSample(0, (math.nan, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), 'is no number'),
+        (PoseSample(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)), 'is no unit quaternion'),
+    ],
+)
 def test_what_is_no_pose_is_told(pose, message):
     with pytest.raises(ValueError, match=message):
         PosePairs(PoseParams(), SLOPE).take(FRONT, pose)

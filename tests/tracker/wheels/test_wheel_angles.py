@@ -59,6 +59,7 @@ def n_true(truth: Walk, samples: list[JointSample]) -> int:
 
 # --- the truth -----------------------------------------------------------------------------------------------------
 
+
 def test_a_walk_is_followed_through_many_turns() -> None:
     truth = walk(30.0, FPS)
     samples, status = follow(film(truth))
@@ -97,6 +98,7 @@ def test_speed_is_not_smeared_across_strikes(fps: float, noise_deg: float, limit
 
 # --- dropped frames and occlusions ---------------------------------------------------------------------------------
 
+
 def test_n_is_exact_with_a_fifth_of_the_frames_lost_and_one_tag_hidden_for_half_a_second() -> None:
     for start in (5.0, 5.2, 12.3, 20.0):
         truth = walk(30.0, FPS)
@@ -129,7 +131,8 @@ def test_less_than_half_a_turn_unseen_loses_none(
     hidden = between(*spans)
     samples, status = follow(
         film(truth, lost=lost, front_hidden=hidden, rear_hidden=hidden, follows=follows),
-        TrackParams(camera_follows=follows))
+        TrackParams(camera_follows=follows),
+    )
     assert turns_off(truth, samples) == ({0}, {0})
     assert status.lost == 0
 
@@ -162,7 +165,8 @@ def test_where_nothing_tells_the_turns_a_new_run_begins() -> None:
     truth = walk(20.0, FPS)
     hidden = between((3.0, 15.0))
     samples, status = follow(
-        film(truth, front_hidden=hidden, rear_hidden=hidden, follows=True), TrackParams(camera_follows=True))
+        film(truth, front_hidden=hidden, rear_hidden=hidden, follows=True), TrackParams(camera_follows=True)
+    )
     runs = [sample.run for sample in samples]
     assert runs == sorted(runs)
     assert set(runs) == {1, 1 + status.lost}
@@ -193,6 +197,7 @@ def test_a_wheel_that_is_hidden_at_first_joins_later() -> None:
 
 # --- outliers ------------------------------------------------------------------------------------------------------
 
+
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 2**32), st.floats(0.01, 0.2), st.floats(0.0, 0.2))
 def test_outliers_never_leak(seed: int, share: float, lost: float) -> None:
@@ -201,8 +206,10 @@ def test_outliers_never_leak(seed: int, share: float, lost: float) -> None:
     views = film(truth, lost=lost, front_hidden=between((4.0, 4.8)), seed=seed % 1000)
     spoilt = [
         pair._replace(front=pair.front._replace(rotation=pair.front.rotation + random.uniform(0.15, 6.1)))
-        if pair.front and index > 3 and bad else pair
-        for index, (pair, bad) in enumerate(zip(views, (random.random(len(views)) < share).tolist(), strict=True))]
+        if pair.front and index > 3 and bad
+        else pair
+        for index, (pair, bad) in enumerate(zip(views, (random.random(len(views)) < share).tolist(), strict=True))
+    ]
     samples, status = follow(spoilt)
     assert turns_off(truth, samples) == ({0}, {0})
     assert status.lost == 0
@@ -255,14 +262,19 @@ def test_a_wheel_that_is_pushed_is_followed_again() -> None:
 def test_standing_and_held_wheels_have_no_speed() -> None:
     random = np.random.default_rng(0)
     for psi in (0.0, -ALPHA, ALPHA - 1e-4, ALPHA + 1e-4, 5 * PITCH + ALPHA):
-        samples, _ = follow([PairView(START_NS + i * 16_666_667, view(psi + 1e-3 * random.standard_normal()), view(1.0))
-                             for i in range(300)])
+        samples, _ = follow(
+            [
+                PairView(START_NS + i * 16_666_667, view(psi + 1e-3 * random.standard_normal()), view(1.0))
+                for i in range(300)
+            ]
+        )
         rates = np.array([sample.front.rate for sample in samples[60:]])
         assert abs(rates.mean()) < 0.02
         assert rates.std() < 0.1
 
 
 # --- stamps --------------------------------------------------------------------------------------------------------
+
 
 def test_repeated_and_reversed_stamps_are_passed_over() -> None:
     views = film(walk(3.0, FPS))
@@ -284,8 +296,10 @@ VIEWS = st.none() | st.builds(view, st.floats(-10, 10), st.floats(-1e6, 1e6), st
 
 
 @settings(max_examples=100, deadline=None)
-@given(st.lists(st.builds(PairView, st.integers(0, 2**62) | st.integers(0, 10**9), VIEWS, VIEWS), max_size=60),
-       st.booleans())
+@given(
+    st.lists(st.builds(PairView, st.integers(0, 2**62) | st.integers(0, 10**9), VIEWS, VIEWS), max_size=60),
+    st.booleans(),
+)
 def test_no_view_whatever_breaks_it(views: list[PairView], follows: bool) -> None:
     samples, status = follow(views, TrackParams(camera_follows=follows))
     assert status.views == len(views)
