@@ -88,7 +88,10 @@ def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where pip installed a copy of the package; the copy keeps build files out of the tree."""
     folder = tmp_path_factory.mktemp('pip')
     source = folder / 'source'
-    shutil.copytree(ROOT, source, ignore=shutil.ignore_patterns('.venv*', '.git', 'build', '*.egg-info', 'trials'))
+    tracked = subprocess.run(['git', 'ls-files', '-z'], cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    for file in tracked.rstrip('\0').split('\0'):
+        (source / file).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / file, source / file)
     # --ignore-installed: pip would take away the copy that this environment works with.
     subprocess.run(
         [
@@ -123,6 +126,9 @@ def test_pip_installs_what_ros2_run_looks_for(prefix):
         assert (prefix / 'share' / 'dcdrw' / file).exists()
     (site,) = prefix.glob('lib/python3*/site-packages')
     assert {path.name for path in site.iterdir() if not path.name.endswith('-info')} == set(PACKAGES)
+    assert {path.parent.relative_to(site) for path in site.rglob('__init__.py')} == {
+        path.parent.relative_to(ROOT) for package in PACKAGES for path in (ROOT / package).rglob('__init__.py')
+    }
 
 
 def test_installed_command_runs(prefix):

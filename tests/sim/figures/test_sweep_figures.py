@@ -19,7 +19,7 @@ Figure = pytest.importorskip('matplotlib.figure').Figure
 pytest.importorskip('xarray')
 pytest.importorskip('netCDF4')
 
-from dcdrw_sim import regime_figures, sweep_figures  # noqa: E402
+from dcdrw_sim.figures import regime_figures, sweep_figures  # noqa: E402
 from dcdrw_sim.study.sweep_dataset import open_sweep  # noqa: E402
 from dcdrw_sim.study.sweep_run import run_sweep  # noqa: E402
 
