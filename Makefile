@@ -14,11 +14,12 @@ endif
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: help trial test lint bench clean
+.PHONY: help trial test lint format bench clean
 help:
 	@echo 'make trial   run the paper'"'"'s trial in simulation and draw it (into trials/)'
 	@echo 'make test    run every test'
 	@echo 'make lint    ruff and mypy --strict'
+	@echo 'make format  ruff format'
 	@echo 'make bench   print the tables of speed (minutes)'
 	@echo 'make clean   remove what was made here; trials stay'
 
@@ -37,7 +38,12 @@ endif
 
 lint: $(READY)
 	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check --quiet . || { echo 'some files are not formatted: make format'; exit 1; }
 	@$(BIN)/mypy
+
+format: $(READY)
+	@$(BIN)/ruff check --fix .
+	@$(BIN)/ruff format .
 
 bench: $(READY)
 	@for table in benchmarks/*.py; do echo; echo "$$table"; $(BIN)/python $$table || exit; done

@@ -10,6 +10,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from catkin_pkg.changelog import get_changelog_from_path
 
 from dcdrw.suite.executables import EXECUTABLES
 from tests import ROOT
@@ -142,3 +143,10 @@ def test_installed_command_runs(prefix):
     )
     assert done.returncode == 0
     assert 'simulate' in done.stdout
+
+
+def test_the_changelog_reads_as_catkin_reads_it_and_ends_with_this_version():
+    changelog = get_changelog_from_path(str(ROOT), 'dcdrw')
+    latest, _, entries = next(changelog.foreach_version())
+    assert latest == manifest().findtext('version')
+    assert entries
