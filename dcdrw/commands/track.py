@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dcdrw.arguments import number, positive
-from dcdrw.commands.analyze import write_results
 from dcdrw.commands.film import Files, open_video
 from dcdrw.commands.trial import free_folder
 from dcdrw.progress import Progress, interruptible
@@ -24,6 +23,7 @@ from dcdrw.recordings.joint_recording import record_joints
 from dcdrw.recordings.recording import RECORDING
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw.trials.analysis import Analysis, analyze
+from dcdrw.trials.results import write_results
 from dcdrw.trials.summary import sentence
 from dcdrw_msgs_py.camera import Camera, read_camera
 from dcdrw_msgs_py.frame import Frame

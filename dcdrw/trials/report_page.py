@@ -7,15 +7,13 @@ from collections.abc import Mapping, Sequence
 from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from dcdrw.trials.day import Trial
 from dcdrw.trials.figure import draw_trial
 from dcdrw.trials.summary import final_band, sentence
-
-if TYPE_CHECKING:
-    from dcdrw.commands.report import Trial
 
 # Okabe and Ito's palette.
 _COLOURS = '#0072B2', '#D55E00', '#009E73', '#CC79A7', '#56B4E9', '#E69F00', '#000000'
@@ -57,7 +55,7 @@ _PAGE = """<!doctype html>
 """
 
 
-def page(title: str, trials: Sequence['Trial'], tables: Mapping[str, str]) -> str:
+def page(title: str, trials: Sequence[Trial], tables: Mapping[str, str]) -> str:
     """The page.
 
     Args:
@@ -86,7 +84,7 @@ def page(title: str, trials: Sequence['Trial'], tables: Mapping[str, str]) -> st
     )
 
 
-def _table(trials: Sequence['Trial']) -> str:
+def _table(trials: Sequence[Trial]) -> str:
     heads = (
         'trial',
         'source',
@@ -121,7 +119,7 @@ def _table(trials: Sequence['Trial']) -> str:
     return '<table>' + '\n'.join(f'<tr>{row}</tr>' for row in rows) + '</table>'
 
 
-def _verdict(trial: 'Trial') -> str:
+def _verdict(trial: Trial) -> str:
     status = trial.analysis.status
     if status.synchronized:
         return '<span class="ok">synchronized</span>'
@@ -129,7 +127,7 @@ def _verdict(trial: 'Trial') -> str:
     return f'<span class="bad">{word}</span>'
 
 
-def _section(number: int, trial: 'Trial') -> str:
+def _section(number: int, trial: Trial) -> str:
     about = ''.join(
         f'<dt>{html.escape(name.replace("_", " "))}</dt><dd>{html.escape(value)}</dd>'
         for name, value in trial.about.items()
@@ -146,14 +144,14 @@ def _figure(svg: str, caption: str) -> str:
     return f'<figure>{svg}<figcaption>{caption}</figcaption></figure>\n'
 
 
-def _picture(trial: 'Trial') -> str:
+def _picture(trial: Trial) -> str:
     with TemporaryDirectory() as folder:
         path = Path(folder) / 'trial.svg'
         draw_trial(trial.analysis, '', path)
         return _inline(path.read_text(encoding='utf-8'))
 
 
-def _overlay(trials: Sequence['Trial']) -> str:
+def _overlay(trials: Sequence[Trial]) -> str:
     figure, axes = _axes()
     band = max(trial.analysis.params.sync.band_percent for trial in trials)
     axes.axhspan(50 - band, 50 + band, color=_BAND, alpha=0.18, linewidth=0, label=f'±{band:g} % of 50 %')
@@ -174,7 +172,7 @@ def _overlay(trials: Sequence['Trial']) -> str:
     return _svg(figure)
 
 
-def _decay(trial: 'Trial') -> str:
+def _decay(trial: Trial) -> str:
     figure, axes = _axes()
     band, errors = trial.analysis.params.sync.band_percent, np.array(trial.analysis.status.history)
     steps = np.arange(1, len(errors) + 1)

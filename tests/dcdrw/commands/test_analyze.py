@@ -16,8 +16,8 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.rosbag2.enums import CompressionMode
 
 from dcdrw.cli import main
-from dcdrw.commands.analyze import read_trial
 from dcdrw.recordings.recording import Recording
+from dcdrw.trials.results import read_trial
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatorParams

@@ -1,0 +1,128 @@
+"""A day of recorded trials: each with what was recorded about it, and the tables that hold every number."""
+
+import csv
+import math
+from collections.abc import Iterable
+from io import StringIO
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+
+from dcdrw.recordings.recorder import INFORMATION, METADATA, PARAMETERS
+from dcdrw.recordings.recording import find
+from dcdrw.trials.analysis import Analysis
+from dcdrw.trials.decay import Decay, fit_decay
+from dcdrw.trials.results import read_trial
+from dcdrw.trials.summary import final_band
+from dcdrw_msgs_py.rig import FRONT, RigParams
+from dcdrw_msgs_py.samples import SECOND
+from dcdrw_msgs_py.topics import JOINT_STATES
+
+SIMULATED, MEASURED = 'simulated', 'measured'
+
+
+class Trial(NamedTuple):
+    """A recorded trial and what was recorded about it."""
+
+    name: str
+    analysis: Analysis
+    source: str
+    """SIMULATED or MEASURED."""
+    about: dict[str, str]
+    """Note, machine, version and so on; empty where nothing was recorded."""
+    decay: Decay
+    """Of its error from step to step."""
+    rig: RigParams
+    """k, b and slope are NaN where neither a simulator nor a rig file told them."""
+
+
+TRIAL_COLUMNS: dict[str, Any] = {
+    'trial': lambda trial: trial.name,
+    'source': lambda trial: trial.source,
+    'initial_phase_percent': lambda trial: 100.0 * trial.analysis.status.initial_phase,
+    'synchronized': lambda trial: trial.analysis.status.synchronized,
+    'steps_to_synchronization': lambda trial: trial.analysis.status.steps_to_synchronization,
+    'final_phase_low_percent': lambda trial: 50.0 + final_band(trial.analysis)[0],
+    'final_phase_high_percent': lambda trial: 50.0 + final_band(trial.analysis)[1],
+    'contraction_per_step': lambda trial: trial.decay.ratio,
+    'limit_percent': lambda trial: 50.0 + trial.decay.limit,
+    'k': lambda trial: trial.rig.k,
+    'b': lambda trial: trial.rig.b,
+    'slope_deg': lambda trial: math.degrees(trial.rig.slope),
+    'front_steps': lambda trial: trial.analysis.status.steps,
+    'slips': lambda trial: trial.analysis.status.slips,
+    'seconds': lambda trial: float(trial.analysis.motion.seconds[-1]),
+    'samples_lost': lambda trial: trial.analysis.status.cadence.lost,
+    'started': lambda trial: trial.about.get('started', ''),
+    'note': lambda trial: trial.about.get('note', ''),
+}
+STEP_COLUMNS = ('trial', 'wheel', 'steps', 'seconds', 'x', 'error_percent')
+
+
+def open_trial(path: Path, name: str, rig: Path | None = None, topic: str = JOINT_STATES.name) -> Trial:
+    """Analyze a recording, and read what was recorded about it.
+
+    Raises:
+        ValueError, OSError: as `dcdrw.trials.results.read_trial`.
+
+    """
+    analysis, _ = read_trial(path, rig=rig, topic=topic)
+    if not len(analysis.motion.stamp_ns):
+        raise ValueError(f'{path} has no joint state that could be used')
+    folder = find(path)
+    folder = folder if folder.is_dir() else folder.parent
+    errors = analysis.status.history
+    source = _source(folder)
+    built = analysis.params.rig
+    if source == MEASURED and not rig:
+        built = built._replace(k=math.nan, b=math.nan, slope=math.nan)
+    return Trial(name, analysis, source, _about(folder), fit_decay(errors), built)
+
+
+def table(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
+    """CSV; what is unknown is empty."""
+    file = StringIO()
+    writer = csv.writer(file)
+    writer.writerow(header)
+    writer.writerows(['' if isinstance(value, float) and math.isnan(value) else value for value in row] for row in rows)
+    return file.getvalue()
+
+
+def step_rows(trial: Trial) -> Iterable[tuple[Any, ...]]:
+    """Every footfall, with the error at those of the front wheel."""
+    errors = iter(trial.analysis.status.history)
+    start = int(trial.analysis.motion.stamp_ns[0])
+    for fall in trial.analysis.footfalls:
+        error = next(errors, math.nan) if fall.wheel == FRONT else math.nan
+        yield trial.name, fall.wheel, fall.steps, (fall.stamp_ns - start) / SECOND, fall.x, error
+
+
+def new_name(path: Path, others: list[Trial]) -> str:
+    """The recording's name; that of the trial where it is the one within its folder."""
+    path = path.resolve()
+    name = path.stem if path.is_file() else path.parent.name if path.name == 'recording' else path.name
+    taken = {trial.name for trial in others}
+    return next(
+        candidate
+        for candidate in (name, *(f'{name} ({number})' for number in range(2, len(taken) + 3)))
+        if candidate not in taken
+    )
+
+
+def _source(folder: Path) -> str:
+    """Whether a simulator ran; the coupler of a trial without one is what --rig says."""
+    try:
+        content = yaml.safe_load((folder / PARAMETERS).read_text(encoding='utf-8'))
+    except OSError:
+        return MEASURED
+    return SIMULATED if isinstance(content, dict) and 'simulator' in content else MEASURED
+
+
+def _about(folder: Path) -> dict[str, str]:
+    try:
+        content = yaml.safe_load((folder / METADATA).read_text(encoding='utf-8'))
+    except OSError:
+        return {}
+    about = content[INFORMATION].get('custom_data') or {}
+    return {name: str(value) for name, value in about.items() if name != 'parameters' and value}

@@ -1,0 +1,87 @@
+"""The results of a recorded trial: read and judged, held against what its nodes published, written into a folder."""
+
+import csv
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from dcdrw.recordings.joint_batch import JointBatch
+from dcdrw.recordings.recording import Recording
+from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
+from dcdrw.trials.agreement import Agreement, compare
+from dcdrw.trials.analysis import Analysis, analyze
+from dcdrw.trials.figure import draw_trial
+from dcdrw.trials.summary import sentence, summarize
+from dcdrw_msgs_py.samples import Footfall
+from dcdrw_msgs_py.topics import JOINT_STATES
+
+SAMPLES_HEADER = ('stamp_ns', 'theta1', 'omega1', 'theta2', 'omega2', 'phi', 'phi_rate', 'step_difference', 'restarts')
+
+
+def read_trial(
+    path: Path, params: TrialParams | None = None, rig: Path | None = None, topic: str = JOINT_STATES.name
+) -> tuple[Analysis, dict[str, Agreement]]:
+    """Analyze the trial in a recording, and hold the result against what the nodes published then.
+
+    Args:
+        path: the recording, or the trial's folder.
+        params: by default those that were recorded, or where there are none the suite's defaults.
+        rig: a parameter file; what it names takes the place of these.
+        topic: where the joint states are, in any namespace.
+
+    Raises:
+        ValueError: no recording, no such topic, or no joint states that can be read.
+        OSError: a file cannot be read.
+
+    """
+    with Recording(path) as recording:
+        name = recording.find(topic)
+        if params is None:
+            params = TrialParams()
+            if recording.parameters:
+                params = read_parameter_file(recording.parameters, params)
+        if rig:
+            params = read_parameter_file(rig, params)
+        trial = analyze(_shown(recording.joints(name), recording.count(name)), params)
+        if trial.unreadable and not len(trial.motion.stamp_ns):
+            raise ValueError(f'{path}: {name}: {trial.unreadable} (front_joint and rear_joint in a rig file name them)')
+        return trial, compare(recording, trial, name.rpartition('/')[0])
+
+
+def _shown(batches: Iterator[JointBatch], total: int) -> Iterator[JointBatch]:
+    done = 0
+    for batch in batches:
+        yield batch
+        done += batch.messages
+        if sys.stderr.isatty():
+            share = f'{100 * done // total} %' if done < total else ''
+            print(f'\r\x1b[K{share}', end='', file=sys.stderr, flush=True)
+
+
+def describe(agreements: dict[str, Agreement]) -> dict[str, dict[str, int]]:
+    """For a program."""
+    return {topic: agreement._asdict() for topic, agreement in agreements.items()}
+
+
+def write_results(trial: Analysis, folder: Path, **more: Any) -> None:
+    """Write summary.json, samples.csv, footfalls.csv and trial.png into a folder.
+
+    Raises:
+        ValueError: there is no picture, for want of matplotlib; all else is written.
+        OSError: the disk is full, say.
+
+    """
+    content = json.dumps({**more, **summarize(trial)}, indent=1, ensure_ascii=False)
+    (folder / 'summary.json').write_text(content + '\n', encoding='utf-8')
+    with (folder / 'samples.csv').open('w', encoding='utf-8', newline='') as file:
+        writer = csv.writer(file)
+        writer.writerow(SAMPLES_HEADER)
+        writer.writerows(zip(*(getattr(trial.motion, name).tolist() for name in SAMPLES_HEADER), strict=True))
+    with (folder / 'footfalls.csv').open('w', encoding='utf-8', newline='') as file:
+        writer = csv.writer(file)
+        writer.writerow(Footfall._fields)
+        writer.writerows(trial.footfalls)
+    if len(trial.motion.stamp_ns):
+        draw_trial(trial, sentence(trial), folder / 'trial.png')

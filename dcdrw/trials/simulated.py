@@ -1,0 +1,217 @@
+"""A trial in simulation: the nodes as processes, watched live from the start to the record's judgement."""
+
+import math
+import os
+import signal
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from dcdrw.recordings.recorder import RecorderParams
+from dcdrw.recordings.recording import RECORDING, Recording
+from dcdrw.suite.executables import RECORDER, SIMULATOR, TAG_TRACKER, TRIAL, VIRTUAL_CAMERA, Executable
+from dcdrw.suite.parameter_file import TrialParams, write_parameter_file
+from dcdrw.suite.processes import NodeProcess
+from dcdrw.trials.agreement import Agreement
+from dcdrw.trials.analysis import Analysis, analyze
+from dcdrw.trials.filmed_rig import FilmedRig, TruthError, truth_error
+from dcdrw.trials.results import read_trial
+from dcdrw_msgs_py.diagnosis import Diagnosis, Level
+from dcdrw_msgs_py.topics import FOOTFALLS, JOINT_STATES, PHASE_STATE, SYNC_ERROR
+
+if TYPE_CHECKING:
+    from dcdrw.nodes.observer import Observer
+
+START_SECONDS = 30.0
+"""Limit for the nodes to start, find each other and let data through."""
+ASK_AGAIN_SECONDS = 2.0
+"""A request that has brought nothing for so long is sent again [s]."""
+SILENCE_SECONDS = 3.0
+"""Without data for this long, a trial has failed."""
+TRUTH = 'true_joint_states'
+"""What the simulator publishes in the place of joint_states where a camera films the rig."""
+INTERRUPTED = 'interrupted before the start'
+
+
+class TrialError(Exception):
+    """The trial cannot go on."""
+
+
+class Course(NamedTuple):
+    """How a trial went, and what its record says."""
+
+    failure: str
+    """Why it ended early or cannot be judged; empty where it ran to its end or was interrupted."""
+    interrupted: bool
+    analysis: Analysis
+    """Of what was recorded."""
+    agreements: dict[str, Agreement]
+    truth: TruthError | None
+    """Where a camera filmed the rig."""
+    diagnoses: dict[str, Diagnosis]
+    """What each node said of itself last."""
+
+    @property
+    def end(self) -> str:
+        """Why it ended, in words."""
+        return self.failure or ('interrupted' if self.interrupted else 'complete')
+
+
+class SimulatedTrial:
+    """One trial from start to record.
+
+    Args:
+        params: of all nodes.
+        filmed: camera and tracker, where these stand between the simulator and the others.
+        folder: for the recording and what each node prints; exists.
+        environment: the ROS domain of the nodes.
+        seconds: how long the wheels roll, by the stamps [s].
+        note: kept with the recording.
+        say: told what the trial is at.
+        show: told now and then what the observer sees.
+
+    """
+
+    def __init__(
+        self,
+        params: TrialParams,
+        filmed: FilmedRig | None,
+        folder: Path,
+        environment: dict[str, str],
+        seconds: float,
+        note: str,
+        say: Callable[[str], None],
+        show: Callable[['Observer'], None],
+    ) -> None:
+        self._params, self._filmed, self._folder, self._environment = params, filmed, folder, environment
+        self._seconds, self._note, self._say, self._show = seconds, note, say, show
+        self._executables: tuple[Executable, ...] = (*TRIAL, VIRTUAL_CAMERA, TAG_TRACKER) if filmed else TRIAL
+        self._nodes: list[NodeProcess] = []
+        self._interrupted = False
+
+    def run(self) -> Course:
+        """Run it, until its end, a failure or a signal."""
+        os.environ.update(self._environment)
+        import rclpy
+        from rclpy.signals import SignalHandlerOptions
+
+        from dcdrw.nodes.observer import Observer
+        from dcdrw_msgs_py.node import make_executor
+
+        def interrupt(*_: object) -> None:
+            self._interrupted = True
+
+        with ExitStack() as stack:
+            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+                stack.callback(signal.signal, number, signal.signal(number, interrupt))
+            rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+            stack.callback(rclpy.try_shutdown)
+            self._observer = Observer(self._params.sync)
+            self._executor = make_executor()
+            self._executor.add_node(self._observer)
+            stack.callback(self._stop_nodes)
+            failure = ''
+            try:
+                self._start_nodes()
+                self._let_go()
+                self._watch()
+            except TrialError as error:
+                failure = str(error)
+            self._stop_nodes()
+            return self._judge(failure)
+
+    def _start_nodes(self) -> None:
+        file = self._folder / 'parameters.yaml'
+        held = self._params.simulator._replace(paused=True)
+        topics = f'{TRUTH}:{JOINT_STATES.type}' if self._filmed else ''
+        recorder = RecorderParams(str(self._folder / RECORDING), self._note, topics, record=True)
+        write_parameter_file((*self._params._replace(simulator=held), *(self._filmed or ()), recorder), file)
+        for node in (RECORDER, *reversed(self._executables)):  # who listens, first
+            arguments = ['--ros-args', '--params-file', str(file)]
+            if self._filmed and node in (SIMULATOR, VIRTUAL_CAMERA):
+                arguments += ['-r', f'{JOINT_STATES.name}:={TRUTH}']
+            self._nodes.append(
+                NodeProcess(node.name, node.module, arguments, self._environment, self._folder / f'{node.name}.log')
+            )
+        self._say('starting the nodes ...')
+        self._spin_until(self._all_at_work, START_SECONDS, 'no data came through the nodes')
+
+    def _all_at_work(self) -> bool:
+        """Whether data come through the whole chain, and the recorder has them, and every parameter."""
+        needed, recorder = (PHASE_STATE, SYNC_ERROR), self._observer.diagnoses.get(RECORDER.name)
+        if recorder is None or not {topic.name for topic in needed} <= self._observer.heard:
+            return False
+        told = recorder.values
+        return (
+            all(int(told.get(f'messages of /{topic.name}', 0)) > 0 for topic in (JOINT_STATES, *needed))
+            and f'messages of /{FOOTFALLS.name}' in told
+            and all(node.name in told.get('parameters of', '') for node in self._executables)
+        )
+
+    def _let_go(self) -> None:
+        """Release the wheels, which were held until the whole chain was seen to work."""
+        from std_srvs.srv import SetBool
+
+        client = self._observer.create_client(SetBool, '/simulator/pause')
+        self._spin_until(client.service_is_ready, START_SECONDS, 'the service /simulator/pause was not found')
+        self._observer.age.renew()
+        asked = -math.inf
+
+        def moving() -> bool:
+            nonlocal asked
+            if time.monotonic() - asked > ASK_AGAIN_SECONDS:
+                asked = time.monotonic()
+                client.call_async(SetBool.Request(data=False))
+            return self._observer.moving
+
+        self._spin_until(moving, START_SECONDS, 'the simulator did not let the wheels go')
+
+    def _watch(self) -> None:
+        while not self._interrupted and self._observer.seconds < self._seconds:
+            self._spin_once()
+            self._show(self._observer)
+            if self._observer.age.seconds > SILENCE_SECONDS:
+                raise TrialError(f'no data for {SILENCE_SECONDS:g} s')
+
+    def _spin_until(self, condition: Callable[[], bool], limit: float, otherwise: str) -> None:
+        end = time.monotonic() + limit
+        while not condition():
+            if self._interrupted:
+                raise TrialError(INTERRUPTED)
+            if time.monotonic() > end:
+                said = '; '.join(f'{name}: {said.message}' for name, said in self._observer.diagnoses.items())
+                raise TrialError(f'{otherwise} ({said or "the nodes say nothing"})')
+            self._spin_once()
+
+    def _spin_once(self) -> None:
+        self._executor.spin_once(timeout_sec=0.05)
+        for node in self._nodes:
+            if node.failure and not self._interrupted:
+                raise TrialError(node.failure)
+        recorder = self._observer.diagnoses.get(RECORDER.name)
+        if recorder and recorder.level is Level.ERROR:
+            raise TrialError(recorder.message)
+
+    def _stop_nodes(self) -> None:
+        """The recorder first: what the others publish when they end is no part of the trial."""
+        for group in (self._nodes[:1], self._nodes[1:]):
+            for node in group:
+                node.interrupt()
+            for node in group:
+                node.wait()
+
+    def _judge(self, failure: str) -> Course:
+        """Judge what there is, whatever happened."""
+        truth: TruthError | None = None
+        agreements: dict[str, Agreement] = {}
+        try:
+            analysis, agreements = read_trial(self._folder / RECORDING, self._params)
+            if self._filmed:
+                with Recording(self._folder / RECORDING) as recording:
+                    truth = truth_error(analysis, recording.joints(recording.find(TRUTH)))
+        except (ValueError, OSError) as error:
+            analysis = analyze([], self._params)
+            failure = failure or str(error)
+        return Course(failure, self._interrupted, analysis, agreements, truth, self._observer.diagnoses)
