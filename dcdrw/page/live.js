@@ -15,7 +15,7 @@ const SIGNS = {
 };
 
 const element = (id) => document.getElementById(id);
-let socket = null, wait = FIRST_WAIT_MS, heardAt = -Infinity, scheduled = 0;
+let socket = null, wait = FIRST_WAIT_MS, timer = 0, heardAt = -Infinity, scheduled = 0;
 let kept, frame, board, run;
 
 function forget() {
@@ -24,24 +24,41 @@ function forget() {
 }
 
 function connect() {
-  socket = new WebSocket(`${location.protocol.replace('http', 'ws')}//${location.host}/ws`);
-  const mine = socket;
+  if (socket) return;
+  const mine = socket = new WebSocket(`${location.protocol.replace('http', 'ws')}//${location.host}/ws`);
   let first = true;
+  mine.onopen = () => later(reconnect, DEAD_MS);
   mine.onmessage = ({ data }) => {
+    if (mine !== socket) return;
     if (first) forget();  // the first message brings all that the charts need
     for (const news of JSON.parse(data)) take(news, first);
     first = false;
     heardAt = performance.now();
     wait = FIRST_WAIT_MS;
+    later(reconnect, DEAD_MS);
     schedule();
   };
-  mine.onclose = () => {
-    if (mine !== socket) return;
-    heardAt = -Infinity;
-    watch();
-    setTimeout(connect, wait * (0.75 + 0.5 * Math.random()));
-    wait = Math.min(2 * wait, LONGEST_WAIT_MS);
-  };
+  mine.onclose = () => mine === socket && reconnect();
+}
+
+function reconnect() {
+  disconnect();
+  watch();
+  later(connect, wait * (0.75 + 0.5 * Math.random()));
+  wait = Math.min(2 * wait, LONGEST_WAIT_MS);
+}
+
+function disconnect() {
+  clearTimeout(timer);
+  socket?.close();
+  socket = null;
+  heardAt = -Infinity;
+}
+
+// The one next step: to give up a silent connection, or to connect.
+function later(step, delay) {
+  clearTimeout(timer);
+  timer = setTimeout(step, delay);
 }
 
 function take(news, old) {
@@ -96,7 +113,6 @@ function watch() {
     showState('NO DATA', 'no connection to dcdrw live; trying again …');
     showControls(board && { ...board, simulated: false, recorder: false });
   }
-  if (silence > DEAD_MS && socket.readyState === WebSocket.OPEN) socket.close();
 }
 
 function showState(state, detail) {
@@ -151,10 +167,14 @@ function showNodes(nodes) {
 
 forget();
 setUpControls((command) => {
-  if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command));
+  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command));
 });
 if (location.search) history.replaceState(null, '', location.pathname);  // the cookie knows the token now
 onLookChange(schedule);
 setInterval(watch, 250);
 document.addEventListener('visibilitychange', () => document.hidden || schedule());
-connect();
+// A browser cuts the socket that a frozen page, or one kept for its back button, leaves open, and reports a failure.
+document.addEventListener('freeze', disconnect);
+document.addEventListener('resume', connect);
+addEventListener('pagehide', disconnect);
+addEventListener('pageshow', connect);  // also when it is shown for the first time

@@ -226,6 +226,10 @@ def test_page_outlives_nodes_servers_and_sleep(bench, live, chromium):
         one.send('Page.bringToFront')
     before = int(drawn(phone)['stampNs'])
     phone.wait(RIG, lambda rig: int(json.loads(rig)['stampNs']) > before)
+    passes(phone, 'pagehide')  # as a page that its browser keeps for the back button
+    phone.wait(f'{STATE} === "{NO_DATA}"')
+    passes(phone, 'pageshow')
+    phone.wait(f'{STATE} !== "{NO_DATA}"')
     assert tab.complaints == phone.complaints == []
 
     live.end(signal.SIGKILL)
@@ -237,6 +241,10 @@ def test_page_outlives_nodes_servers_and_sleep(bench, live, chromium):
         one.wait(f'{STATE} !== "{NO_DATA}"')
         # That its server was away is all that the browser itself has to say.
         assert all('WebSocket connection' in complaint for complaint in one.complaints)
+
+
+def passes(tab: Tab, event: str) -> None:
+    tab.value(f"dispatchEvent(new PageTransitionEvent('{event}', {{persisted: true}}))")
 
 
 def test_trial_starts_the_nodes_and_lets_the_wheels_go(chromium):
