@@ -145,6 +145,7 @@ def test_installed_command_runs(prefix):
     assert 'simulate' in done.stdout
 
 
+@pytest.mark.filterwarnings('ignore:nodes.Node.traverse:DeprecationWarning')  # catkin_pkg's own
 def test_the_changelog_reads_as_catkin_reads_it_and_ends_with_this_version():
     changelog = get_changelog_from_path(str(ROOT), 'dcdrw')
     latest, _, entries = next(changelog.foreach_version())
