@@ -30,8 +30,9 @@ from std_msgs.msg import Float64, Int32
 
 from dcdrw.suite.executables import TRIAL
 from dcdrw.suite.processes import free_domain
+from dcdrw_msgs_py.executor import StreamExecutor
 from dcdrw_msgs_py.messages import SECOND, JointSampleReader, JointSampleWriter, PhaseSampleWriter, stamp_ns
-from dcdrw_msgs_py.node import advertise, listen, make_executor, run, steady_clock
+from dcdrw_msgs_py.node import advertise, listen, run, steady_clock
 from dcdrw_msgs_py.samples import CouplerSample, JointSample, Turn
 from dcdrw_msgs_py.topics import JOINT_STATES, PHASE_STATE, PHI, STEP_DIFFERENCE, SYNC_ERROR, SYNC_ERROR_PERCENT
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams
@@ -102,7 +103,7 @@ def measure(commands: list[list[str]], errors_of: Callable[[list[Any]], list[flo
     errors: list[tuple[float, int]] = []
     listen(listener, JOINT_STATES, joints.append)
     listen(listener, SYNC_ERROR, lambda message: errors.append((message.data, time.time_ns())))
-    executor = make_executor()
+    executor = StreamExecutor()
     executor.add_node(listener)
     try:
         limit = time.monotonic() + 30.0

@@ -1,7 +1,9 @@
 """What every node does alike: declare parameters, advertise, listen, report, spin, and end cleanly."""
 
+import faulthandler
 import gc
 import math
+import os
 import signal
 import sys
 import time
@@ -14,13 +16,14 @@ import rclpy
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
-from dcdrw_msgs_py.diagnosis import Diagnosis
+from dcdrw_msgs_py.diagnosis import Diagnosis, Level
+from dcdrw_msgs_py.executor import StreamExecutor
 from dcdrw_msgs_py.messages import diagnostics_message
 from dcdrw_msgs_py.quantity import Field, build, fields, flatten
 from dcdrw_msgs_py.topics import DIAGNOSTICS, SAMPLE_DEPTH, Topic
@@ -29,6 +32,12 @@ Params = TypeVar('Params', bound=tuple[Any, ...])
 
 SPIN_SECONDS = 0.1
 """How long a spin waits at most before it looks whether a signal came."""
+END_SECONDS = 5.0
+"""A node that has not ended so long after a signal is ended by force: DDS was seen to hang for minutes [s]."""
+TWIN_SECONDS = 0.2
+"""A terminal and `ros2 launch` both pass on one Ctrl-C: a second signal this soon is the same one [s]."""
+OLD, FRESH = 0.25, 0.05
+"""Messages older than the first are too old to hear for long; those younger than the second are heard again [s]."""
 
 
 class Parameters(Generic[Params]):
@@ -110,14 +119,57 @@ def advertise(node: Node, topic: Topic) -> Any:
     return node.create_publisher(message_type(topic), topic.name, qos)
 
 
+class Inbox:
+    """Passes messages on while they are fresh.
+
+    A subscriber that cannot keep up would hear ever older messages, up to the depth of its queue. Once messages have
+    been older than OLD for longer than that, all that wait are dropped and counted, down to the newest ones. A short
+    stall, or a burst, loses nothing.
+    """
+
+    def __init__(self, callback: Callable[[Any], None]) -> None:
+        self._callback = callback
+        self._behind_since = math.inf
+        self._dropping = False
+        self.dropped = 0
+        """Messages that were dropped so far."""
+
+    def __call__(self, message: Any, info: Any) -> None:
+        """Take a message with rclpy's MessageInfo."""
+        age = (time.time_ns() - info['received_timestamp']) * 1e-9
+        if self._dropping:
+            self._dropping = age > FRESH
+        elif age <= OLD:
+            self._behind_since = math.inf
+        else:
+            now = time.monotonic()
+            self._behind_since = min(self._behind_since, now)
+            if now - self._behind_since > OLD:
+                self._dropping, self._behind_since = True, math.inf
+        if self._dropping:
+            self.dropped += 1
+        else:
+            self._callback(message)
+
+
 def listen(node: Node, topic: Topic, callback: Callable[[Any], None], depth: int = SAMPLE_DEPTH) -> Any:
-    """Subscribe so that reliable and best-effort publishers both match; to a latched topic, as it is published."""
-    qos = QoSProfile(depth=max(topic.depth, depth), reliability=ReliabilityPolicy.BEST_EFFORT)
+    """Subscribe so that reliable and best-effort publishers both match; to a latched topic, as it is published.
+
+    Where the node cannot keep up, an `Inbox` drops what is old; `report` tells of it.
+    """
     if topic.latched:
         qos = QoSProfile(
             depth=topic.depth, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
         )
-    return node.create_subscription(message_type(topic), topic.name, callback, qos)
+        return node.create_subscription(message_type(topic), topic.name, callback, qos)
+    qos = QoSProfile(depth=max(topic.depth, depth), reliability=ReliabilityPolicy.BEST_EFFORT)
+    return node.create_subscription(message_type(topic), topic.name, Inbox(callback).__call__, qos)
+
+
+def dropped(node: Node) -> dict[str, int]:
+    """How many messages of each topic a node has dropped because it could not keep up; only topics that lost some."""
+    inboxes = {one.topic_name: getattr(one.callback, '__self__', None) for one in node.subscriptions}
+    return {name: box.dropped for name, box in inboxes.items() if isinstance(box, Inbox) and box.dropped}
 
 
 def report(node: Node, diagnose: Callable[[], Diagnosis]) -> None:
@@ -125,8 +177,18 @@ def report(node: Node, diagnose: Callable[[], Diagnosis]) -> None:
     publisher = advertise(node, DIAGNOSTICS)
     name = node.get_fully_qualified_name().lstrip('/')
 
+    told: dict[str, int] = {}
+
     def publish() -> None:
-        publisher.publish(diagnostics_message(name, diagnose(), node.get_clock().now().nanoseconds))
+        diagnosis, lost = diagnose(), dropped(node)
+        if lost:
+            diagnosis.values.update({f'messages dropped: {topic}': str(count) for topic, count in lost.items()})
+        if lost != told:
+            news = ', '.join(f'{count - told.get(topic, 0)} of {topic}' for topic, count in lost.items())
+            message = f'overloaded: dropped {news} within a second; {diagnosis.message}'
+            diagnosis = diagnosis._replace(level=max(diagnosis.level, Level.WARN), message=message)
+            told.update(lost)
+        publisher.publish(diagnostics_message(name, diagnosis, node.get_clock().now().nanoseconds))
 
     node.create_timer(1.0, publish, clock=steady_clock())
 
@@ -152,26 +214,20 @@ class Age:
         return time.monotonic() - self._at
 
 
-def make_executor() -> Any:
-    """The events executor, at a third of the default's cost, where this rclpy has it."""
-    try:
-        from rclpy.experimental.events_executor import EventsExecutor
-    except ImportError:
-        return SingleThreadedExecutor()
-    return EventsExecutor()
-
-
 def run(name: str, make_node: Callable[[], Node], args: list[str] | None = None) -> int:
     """Run one node until SIGINT, SIGTERM or shutdown; returns the process's exit status.
 
     An impossible parameter or argument ends it with one line and status 2.
     """
-    stopped = False
+    stopped = 0.0
 
     def stop(*_: object) -> None:
         # It takes no lock and raises nothing, so that further signals do no harm, even while it runs.
         nonlocal stopped
-        stopped = True
+        if not stopped:
+            stopped = time.monotonic()
+        elif time.monotonic() > stopped + TWIN_SECONDS:
+            os._exit(0)
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, stop)
@@ -182,12 +238,14 @@ def run(name: str, make_node: Callable[[], Node], args: list[str] | None = None)
         print(f'{name}: {error}', file=sys.stderr)
         rclpy.try_shutdown()
         return 2
-    executor = make_executor()
+    executor = StreamExecutor()
     executor.add_node(node)
     gc.freeze()  # what exists now stays: collections that come need not look at it
     with suppress(ExternalShutdownException):
         while not stopped and rclpy.ok():
             executor.spin_once(timeout_sec=SPIN_SECONDS)
+    # A thread without Python ends what hangs: DDS may hold the interpreter.
+    faulthandler.dump_traceback_later(END_SECONDS, exit=True, file=open(os.devnull, 'w'))  # noqa: SIM115
     # In this order, so that no thread of DDS outlives what it works on: neither waits for Python's own end.
     executor.shutdown()
     node.destroy_node()
@@ -195,3 +253,4 @@ def run(name: str, make_node: Callable[[], Node], args: list[str] | None = None)
     for number in (signal.SIGINT, signal.SIGTERM):  # Python itself ends now, and would die of a second signal
         signal.signal(number, signal.SIG_IGN)
     return 0
+

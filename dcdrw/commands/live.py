@@ -111,13 +111,13 @@ def _listener(
     from rclpy.signals import SignalHandlerOptions
 
     from dcdrw.nodes.live_node import LiveNode
-    from dcdrw_msgs_py.node import make_executor
+    from dcdrw_msgs_py.executor import StreamExecutor
 
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     stack.callback(rclpy.try_shutdown)
     node = LiveNode(params, server.show, commands, held, namespace=namespace)
     stack.callback(node.destroy_node)
-    executor = make_executor()
+    executor = StreamExecutor()
     executor.add_node(node)
     stack.callback(executor.shutdown)
     gc.freeze()  # as every node does

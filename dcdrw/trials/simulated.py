@@ -98,7 +98,7 @@ class SimulatedTrial:
         from rclpy.signals import SignalHandlerOptions
 
         from dcdrw.nodes.observer import Observer
-        from dcdrw_msgs_py.node import make_executor
+        from dcdrw_msgs_py.executor import StreamExecutor
 
         def interrupt(*_: object) -> None:
             self._interrupted = True
@@ -109,7 +109,7 @@ class SimulatedTrial:
             rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
             stack.callback(rclpy.try_shutdown)
             self._observer = Observer(self._params.sync)
-            self._executor = make_executor()
+            self._executor = StreamExecutor()
             self._executor.add_node(self._observer)
             stack.callback(self._stop_nodes)
             failure = ''

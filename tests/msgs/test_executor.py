@@ -1,0 +1,147 @@
+"""Streams over real DDS within one process: timers go on, queues stay bounded, and what is old is dropped and told."""
+
+import os
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from dcdrw.suite.processes import free_domain
+from dcdrw_msgs_py import node as nodes
+from dcdrw_msgs_py.executor import StreamExecutor
+from dcdrw_msgs_py.node import FRESH, OLD, Inbox, dropped, listen, steady_clock
+from dcdrw_msgs_py.topics import PHI
+
+pytestmark = pytest.mark.processes
+PATIENCE = 30.0
+
+
+class Pair:
+    """A node that hears and one that speaks, in one executor each."""
+
+    def __init__(self, domain: int) -> None:
+        self.context = Context()
+        rclpy.init(args=[], context=self.context, domain_id=domain)
+        self.hearer = rclpy.create_node('hearer', context=self.context)
+        self.speaker = rclpy.create_node('speaker', context=self.context)
+        self.executor = StreamExecutor(context=self.context)
+        self.executor.add_node(self.hearer)
+        self.executor.add_node(self.speaker)
+
+    def until(self, condition: Callable[[], object], what: str) -> None:
+        limit = time.monotonic() + PATIENCE
+        while not condition():
+            assert time.monotonic() < limit, f'waited in vain for {what}'
+            self.executor.spin_once(timeout_sec=0.1)
+
+    def close(self) -> None:
+        self.executor.shutdown()
+        self.hearer.destroy_node()
+        self.speaker.destroy_node()
+        rclpy.shutdown(context=self.context)
+
+
+@pytest.fixture
+def pair() -> Iterator[Pair]:
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    with free_domain() as domain:
+        pair = Pair(domain)
+        yield pair
+        pair.close()
+
+
+def test_a_timer_has_its_turn_among_messages_that_come_faster_than_they_are_read(pair):
+    heard: list[float] = []
+    ticks: list[int] = []
+
+    def hear(message):
+        heard.append(message.data)
+        time.sleep(0.001)
+
+    pair.hearer.create_subscription(Float64, 'phi', hear, 1000)
+    publisher = pair.speaker.create_publisher(Float64, 'phi', 1000)
+    pair.until(publisher.get_subscription_count, 'the subscription')
+    pair.hearer.create_timer(0.01, lambda: ticks.append(len(heard)), clock=steady_clock())
+    for i in range(500):
+        publisher.publish(Float64(data=float(i)))
+    pair.until(lambda: len(heard) == 500, 'every message')
+    assert heard == sorted(heard)
+    assert len({count for count in ticks if 0 < count < 500}) >= 5
+
+
+def test_services_are_served_and_entities_come_and_go_while_it_spins(pair):
+    pair.hearer.create_service(Trigger, 'ping', lambda request, response: response)
+    client = pair.speaker.create_client(Trigger, 'ping')
+    pair.until(client.service_is_ready, 'the service')
+    answer = client.call_async(Trigger.Request())
+    pair.until(answer.done, 'the answer')
+    heard: list[float] = []
+    subscription = listen(pair.hearer, PHI, lambda message: heard.append(message.data))
+    publisher = pair.speaker.create_publisher(Float64, 'phi', 10)
+    pair.until(publisher.get_subscription_count, 'the subscription')
+    publisher.publish(Float64(data=1.0))
+    pair.until(lambda: heard == [1.0], 'the message')
+    pair.hearer.destroy_subscription(subscription)
+    pair.until(lambda: not publisher.get_subscription_count(), 'its end')
+
+
+def test_an_exception_of_a_callback_comes_out_of_the_executor(pair):
+    def fail() -> None:
+        raise KeyError('ours')
+
+    pair.hearer.create_timer(0.001, fail, clock=steady_clock())
+    with pytest.raises(KeyError, match='ours'):
+        pair.until(lambda: False, 'the exception')
+
+
+class Clock:
+    """Time as the inbox sees it, in seconds."""
+
+    now = 1000.0
+
+    def time_ns(self) -> int:
+        return round(self.now * 1e9)
+
+    def monotonic(self) -> float:
+        return self.now
+
+
+def heard_of(monkeypatch: pytest.MonkeyPatch, arrivals: list[float], seconds_each: float) -> tuple[list[float], Inbox]:
+    """Ages of the messages that a reader hears which takes so long for each."""
+    clock, ages = Clock(), []
+    monkeypatch.setattr(nodes, 'time', clock)
+
+    def hear(arrival: float) -> None:
+        ages.append(clock.now - arrival)
+        clock.now += seconds_each
+
+    inbox = Inbox(hear)
+    for arrival in arrivals:
+        clock.now = max(clock.now, arrival)
+        inbox(arrival, {'received_timestamp': round(arrival * 1e9)})
+    return ages, inbox
+
+
+def test_a_reader_three_times_too_slow_hears_no_old_messages_and_counts_what_it_missed(monkeypatch):
+    arrivals = [1000.0 + 0.001 * i for i in range(20_000)]
+    ages, inbox = heard_of(monkeypatch, arrivals, 0.003)
+    assert inbox.dropped + len(ages) == len(arrivals)
+    assert max(ages) < 3 * OLD
+    assert 0.2 * len(arrivals) < len(ages) < 0.4 * len(arrivals)
+
+
+def test_a_stall_or_a_burst_that_the_reader_catches_up_with_loses_nothing(monkeypatch):
+    stall = [1000.0 + 0.001 * i for i in range(1000)]
+    assert heard_of(monkeypatch, [*stall, *[1002.0] * 1000], 0.0001)[1].dropped == 0
+    assert FRESH < OLD
+
+
+def test_a_node_tells_which_topics_it_dropped_messages_of(pair):
+    subscription = listen(pair.hearer, PHI, lambda message: None)
+    assert dropped(pair.hearer) == {}
+    subscription.callback.__self__.dropped = 3
+    assert dropped(pair.hearer) == {subscription.topic_name: 3}
