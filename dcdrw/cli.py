@@ -1,30 +1,38 @@
-"""The command `dcdrw`."""
+"""The command `dcdrw`: which commands there are. The module of one is imported when it is chosen."""
 
-import argparse
 import sys
-from importlib.metadata import PackageNotFoundError, version
+from typing import NamedTuple
 
-from dcdrw.commands import (
-    analyze,
-    calibrate,
-    design,
-    figures,
-    film,
-    live,
-    models,
-    record,
-    regimes,
-    replay,
-    report,
-    return_map,
-    simulate,
-    sweep,
-    tag_sheet,
-    track,
-    trial,
-    urdf,
-)
-from dcdrw.suite.executables import EXECUTABLES
+from dcdrw.entry import EXECUTABLES
+
+
+class Command(NamedTuple):
+    """One command: `add_arguments` of its module describes it and declares what it takes, `run` runs it."""
+
+    module: str
+    help: str
+
+
+COMMANDS = {
+    'trial': Command('trial', 'run a trial in simulation, live, and judge it'),
+    'live': Command('live', 'watch a running suite in the browser'),
+    'record': Command('record', 'record a running suite'),
+    'replay': Command('replay', 'publish recorded joint states again'),
+    'analyze': Command('analyze', 'judge recorded trials'),
+    'report': Command('report', 'recorded trials on one page'),
+    'film': Command('film', 'film a simulated trial, with its ground truth'),
+    'tags': Command('tag_sheet', 'print the tags of the wheels, true to scale'),
+    'track': Command('track', 'track the wheels in a video, and judge the trial'),
+    'calibrate': Command('calibrate', 'learn downhill, lengths and zeros from a video of one roll'),
+    'design': Command('design', 'choose spring and dashpot for a rig'),
+    'sweep': Command('sweep', 'which couplers synchronize, and how fast'),
+    'figures': Command('figures', "the paper's simulated figures, and what explains them"),
+    'regimes': Command('regimes', 'whether a pair walks in step, and how far it is from stalling'),
+    'map': Command('return_map', 'multipliers and regressions of the return map'),
+    'models': Command('models', 'the single wheel and the rigidly coupled pair, to compare with'),
+    'simulate': Command('simulate', 'integrate cases from a JSON file'),
+    'urdf': Command('urdf', 'the rig as a URDF, for RViz and Foxglove'),
+}
 
 _DESCRIPTION = 'Two rimless wheels on a slope, joined by a spring and a damper: simulate them, run and judge trials.'
 _EPILOG = """\
@@ -49,55 +57,17 @@ examples:
   dcdrw simulate case.json --strikes strikes.json --trajectory motion.csv --rate 200
 
 nodes, each run by `ros2 run dcdrw NAME`:
-  """ + ', '.join(node.name for node in EXECUTABLES)
-_COMMANDS = (
-    trial,
-    live,
-    record,
-    replay,
-    analyze,
-    report,
-    film,
-    tag_sheet,
-    track,
-    calibrate,
-    design,
-    sweep,
-    figures,
-    regimes,
-    return_map,
-    models,
-    simulate,
-    urdf,
-)
+  """ + ', '.join(name for name in EXECUTABLES if name != 'dcdrw')
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit status: 0 well, 1 the work failed, 2 the input was wrong."""
-    parser = argparse.ArgumentParser(
-        'dcdrw', description=_DESCRIPTION, epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument('--version', action='version', version=f'dcdrw {_version()}')
-    commands = parser.add_subparsers(title='commands', metavar='COMMAND', required=True)
-    for module in _COMMANDS:
-        module.add_command(commands)
-    options = parser.parse_args(arguments)
-    try:
-        return int(options.run(options))
-    except KeyboardInterrupt:
-        print(f'{options.prog}: interrupted', file=sys.stderr)
-        return 130
-    except (ValueError, OSError) as error:
-        print(f'{options.prog}: {error}', file=sys.stderr)
-        return 2
+    from dcdrw.command_line import CommandLine  # imported here: signals are answered by now
 
-
-def _version() -> str:
-    try:
-        return version('dcdrw')
-    except PackageNotFoundError:
-        return '(not installed)'
+    return CommandLine(COMMANDS, _DESCRIPTION, _EPILOG).run(sys.argv[1:] if arguments is None else arguments)
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    from dcdrw.entry import run
+
+    sys.exit(run('dcdrw'))

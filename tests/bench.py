@@ -14,12 +14,10 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 
-from dcdrw.suite.executables import EXECUTABLES
 from dcdrw.suite.processes import free_domain
 from dcdrw_msgs_py.node import advertise, listen
 from dcdrw_msgs_py.topics import Topic
 
-MODULES = {node.name: node.module for node in EXECUTABLES}
 PATIENCE = 20.0
 """Limit of every wait [s]: discovery alone can take seconds on a busy machine."""
 
@@ -56,7 +54,7 @@ class Bench:
         ]
         with (self.folder / f'{name}.log').open('ab') as log:
             process = subprocess.Popen(
-                [sys.executable, '-m', MODULES[name], '--ros-args', *overrides, *arguments],
+                [sys.executable, '-m', 'dcdrw.entry', name, '--ros-args', *overrides, *arguments],
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 env={**os.environ, 'ROS_DOMAIN_ID': str(self.domain)},

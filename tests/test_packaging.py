@@ -12,11 +12,12 @@ from xml.etree import ElementTree
 import pytest
 from catkin_pkg.changelog import get_changelog_from_path
 
+from dcdrw import entry
 from dcdrw.suite.executables import EXECUTABLES
 from tests import ROOT
 
 PACKAGES = ('dcdrw_msgs_py', 'dcdrw_sim', 'dcdrw_tracker', 'dcdrw')
-COMMANDS = {'dcdrw', *(node.name for node in EXECUTABLES)}
+COMMANDS = set(entry.EXECUTABLES)
 # Third-party modules and the package.xml key (rosdep) that brings each.
 KEYS = {
     'aiohttp': 'python3-aiohttp',
@@ -77,11 +78,15 @@ def test_versions_and_names_agree():
 def test_each_executable_has_an_entry_point_and_a_script():
     lines = config()['options.entry_points']['console_scripts'].strip().splitlines()
     entries = dict(line.split(' = ') for line in lines)
-    assert entries == {'dcdrw': 'dcdrw.cli:main'} | {node.name: f'{node.module}:main' for node in EXECUTABLES}
-    for name, target in entries.items():
+    assert entries == {name: f'dcdrw.entry:{name}' for name in COMMANDS}
+    for name in entries:
         script = ROOT / 'scripts' / name
         assert os.access(script, os.X_OK)
-        assert f'from {target.split(":")[0]} import main' in script.read_text()
+        assert f'from dcdrw.entry import {name}\n' in script.read_text()
+
+
+def test_each_executable_has_a_declaration():
+    assert {'dcdrw', *(node.name for node in EXECUTABLES)} == COMMANDS
 
 
 @pytest.fixture(scope='module')

@@ -2,7 +2,6 @@
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from dcdrw.trials.results import describe, read_trial, write_results
 from dcdrw.trials.summary import sentence
@@ -15,15 +14,10 @@ written. Exit status: 0 all were analyzed, 2 one could not be.
 """
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        'analyze',
-        help='judge recorded trials',
-        epilog=_EPILOG,
-        description='Run the estimator and the monitor over recorded joint states, as fast as they go.',
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
+    parser.description = 'Run the estimator and the monitor over recorded joint states, as fast as they go.'
+    parser.epilog = _EPILOG
     parser.add_argument('recordings', type=Path, nargs='+', metavar='RECORDING')
     parser.add_argument(
         '--rig',
@@ -43,7 +37,6 @@ def add_command(commands: Any) -> None:
         metavar='DIR',
         help='write summary, picture, samples and footfalls here, or into a folder for each',
     )
-    parser.set_defaults(run=run, prog='dcdrw analyze')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -33,15 +33,10 @@ does as well. Exit status: 0 calibrated, 2 wrong input or a roll that tells noth
 """
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        'calibrate',
-        help='learn downhill, lengths and zeros from a video of one roll',
-        epilog=_EPILOG,
-        description='From a video of one roll to a rig file.',
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
+    parser.description = 'From a video of one roll to a rig file.'
+    parser.epilog = _EPILOG
     add_film_arguments(parser)
     parser.add_argument('--out', type=Path, required=True, metavar='OUT.yaml', help='the rig file; must not exist')
     parser.add_argument(
@@ -49,7 +44,6 @@ def add_command(commands: Any) -> None:
         action='store_true',
         help='the camera is level as roll_deg says: learn the slope instead of roll_deg',
     )
-    parser.set_defaults(run=run, prog='dcdrw calibrate')
 
 
 def run(options: argparse.Namespace) -> int:

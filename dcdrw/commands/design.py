@@ -70,15 +70,10 @@ class Part(NamedTuple):
     name: str
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        'design',
-        help='choose spring and dashpot for a rig',
-        epilog=_EPILOG,
-        description='Find the coupler that synchronizes a rig fastest, and the one that forgives most.',
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
+    parser.description = 'Find the coupler that synchronizes a rig fastest, and the one that forgives most.'
+    parser.epilog = _EPILOG
     add_rig_options(parser)
     rig = parser.add_argument_group("the rig, in place of the preset's or the file's")
     rig.add_argument('--mass', type=positive, metavar='KG', help='of each wheel')
@@ -107,7 +102,6 @@ def add_command(commands: Any) -> None:
         help="in step is within ± this of 50 %% (default: %(default)g, the monitor's)",
     )
     parser.add_argument('--out', type=Path, metavar='DIR', help='write card.pdf, card.png and design.json there')
-    parser.set_defaults(run=run, prog='dcdrw design')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -68,16 +68,11 @@ class Book(NamedTuple):
         return max(full // 5, 8) if self.quick else full
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
     listed = ''.join(f'  {name:<14}{(draw.__doc__ or "").splitlines()[0]}\n' for name, draw in FIGURES.items())
-    parser = commands.add_parser(
-        'figures',
-        help="the paper's simulated figures, and what explains them",
-        epilog=_EPILOG.format(figures=listed),
-        description='Draw every simulated figure of the paper, its method mended, from sweeps that are kept.',
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser.description = 'Draw every simulated figure of the paper, its method mended, from sweeps that are kept.'
+    parser.epilog = _EPILOG.format(figures=listed)
     parser.add_argument('--out', type=Path, required=True, metavar='DIR', help='where to put them')
     parser.add_argument(
         '--only', nargs='+', choices=FIGURES, metavar='NAME', default=list(FIGURES), help='some of them only'
@@ -85,7 +80,6 @@ def add_command(commands: Any) -> None:
     parser.add_argument('--format', choices=('png', 'pdf', 'svg'), default='png', help='(default: %(default)s)')
     parser.add_argument('--quick', action='store_true', help='coarse sweeps: to look, not to print')
     parser.add_argument('--cache', type=Path, metavar='DIR', help='where to keep sweeps (default: ~/.cache/dcdrw)')
-    parser.set_defaults(run=run, prog='dcdrw figures')
 
 
 def run(options: argparse.Namespace) -> int:

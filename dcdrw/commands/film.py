@@ -70,15 +70,10 @@ class Files(NamedTuple):
         )
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        'film',
-        help='film a simulated trial, with its ground truth',
-        epilog=_EPILOG,
-        description="Render a simulated trial to a video, as a camera on the rig's left sees it.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
+    parser.description = "Render a simulated trial to a video, as a camera on the rig's left sees it."
+    parser.epilog = _EPILOG
     parser.add_argument('--out', type=Path, required=True, metavar='FILE.mp4', help='the video; must not exist')
     add_rig_options(parser)
     parser.add_argument(
@@ -99,7 +94,6 @@ def add_command(commands: Any) -> None:
         group = parser.add_argument_group(title)
         for field in fields(params):
             _add_option(group, field)
-    parser.set_defaults(run=film, prog='dcdrw film')
 
 
 def _add_option(group: Any, field: Field) -> None:
@@ -119,7 +113,7 @@ def _add_option(group: Any, field: Field) -> None:
         )
 
 
-def film(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     opencv()
     params = _params(options)

@@ -33,15 +33,10 @@ rig file tells what they do not, and is what --trial starts with. Ctrl-C ends.
 """
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        'live',
-        help='watch a running suite in the browser',
-        epilog=_EPILOG,
-        description='Serve a page with the wheels, the phase, the error of each step and the health of the nodes.',
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
+    parser.description = 'Serve a page with the wheels, the phase, the error of each step and the health of the nodes.'
+    parser.epilog = _EPILOG
     add_rig_options(parser)
     parser.add_argument(
         '--trial',
@@ -54,10 +49,9 @@ def add_command(commands: Any) -> None:
     parser.add_argument('--host', default='127.0.0.1', metavar='ADDRESS', help='to serve at (default: %(default)s)')
     parser.add_argument('--token', help=f'what browsers must know; {AUTO}: make one up')
     parser.add_argument('--open', action='store_true', help='open the page in a browser')
-    parser.set_defaults(run=live, prog='dcdrw live')
 
 
-def live(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     for module, mend in (
         ('rclpy', "source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces"),
@@ -145,7 +139,7 @@ def _start_nodes(
     if namespace:
         arguments += ['-r', f'__ns:=/{namespace}']
     nodes = [
-        NodeProcess(node.name, node.module, arguments, environment, folder / f'{node.name}.log')
+        NodeProcess(node.name, 'dcdrw.entry', [node.name, *arguments], environment, folder / f'{node.name}.log')
         for node in (RECORDER, *reversed(TRIAL))
     ]  # who listens, first
 

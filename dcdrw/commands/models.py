@@ -31,18 +31,12 @@ footfalls.png (gait diagrams). models.json holds the numbers, in SI units and ra
 """
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        'models',
-        help='the single wheel and the rigidly coupled pair, to compare with',
-        epilog=_EPILOG,
-        description='Tell what the models that the coupled pair builds on do on its slope.',
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
+    parser.description = 'Tell what the models that the coupled pair builds on do on its slope.'
+    parser.epilog = _EPILOG
     add_rig_options(parser)
     parser.add_argument('--out', type=Path, metavar='DIR', help='draw the pictures and write models.json there, too')
-    parser.set_defaults(run=run, prog='dcdrw models')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -4,7 +4,6 @@ import argparse
 import os
 import sys
 from pathlib import Path
-from typing import Any
 
 from dcdrw.arguments import domain
 from dcdrw.recordings.recorder import new_folder, require_libraries
@@ -16,15 +15,10 @@ Ctrl-C ends it; a kill costs a second at most. Exit status: 0 ended by Ctrl-C, 1
 """
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        'record',
-        help='record a running suite',
-        epilog=_EPILOG,
-        description='Record every topic of the suite, images and rig_markers aside, as it comes off the wire.',
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
+    parser.description = 'Record every topic of the suite, images and rig_markers aside, as it comes off the wire.'
+    parser.epilog = _EPILOG
     parser.add_argument(
         '--out',
         type=Path,
@@ -37,10 +31,9 @@ def add_command(commands: Any) -> None:
     )
     parser.add_argument('--namespace', default='', metavar='NS', help='of the suite')
     parser.add_argument('--domain', type=domain, metavar='N', help='ROS domain (default: ROS_DOMAIN_ID, or 0)')
-    parser.set_defaults(run=record, prog='dcdrw record')
 
 
-def record(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     try:
         import rclpy
@@ -54,7 +47,8 @@ def record(options: argparse.Namespace) -> int:
     if options.domain is not None:
         os.environ['ROS_DOMAIN_ID'] = str(options.domain)
     from dcdrw.nodes.recorder_node import RecorderNode
-    from dcdrw_msgs_py.node import run, steady_clock
+    from dcdrw_msgs_py.node import run as run_node
+    from dcdrw_msgs_py.node import steady_clock
 
     folder = options.out or new_folder()
     values = {'record': True, 'folder': str(folder), 'note': options.note, 'topics': ' '.join(options.topics)}
@@ -78,7 +72,7 @@ def record(options: argparse.Namespace) -> int:
             )
 
     namespace = ['-r', f'__ns:=/{options.namespace.strip("/")}'] if options.namespace else []
-    status = run('dcdrw record', make, ['--ros-args', *namespace])
+    status = run_node('dcdrw record', make, ['--ros-args', *namespace])
     if sys.stderr.isatty():
         print(file=sys.stderr)
     if node and node.failure:

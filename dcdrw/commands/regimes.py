@@ -32,18 +32,12 @@ of these conditions are necessary and which suffice. --json has the same in SI u
 """
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        'regimes',
-        help='whether a pair walks in step, and how far it is from stalling',
-        epilog=_EPILOG,
-        description='Tell what it takes for a pair to walk in step, and whether it has it.',
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
+    parser.description = 'Tell what it takes for a pair to walk in step, and whether it has it.'
+    parser.epilog = _EPILOG
     add_rig_options(parser)
     parser.add_argument('--json', type=Path, metavar='OUT.json', help='write everything here, too')
-    parser.set_defaults(run=run, prog='dcdrw regimes')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -4,7 +4,6 @@ import argparse
 import math
 import sys
 from pathlib import Path
-from typing import Any
 
 from dcdrw.arguments import number, positive
 from dcdrw.recordings.recording import Recording
@@ -19,15 +18,10 @@ Exit status: 0 all was sent, 2 wrong input, 130 interrupted.
 """
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        'replay',
-        help='publish recorded joint states again',
-        epilog=_EPILOG,
-        description='Publish the joint states of a recording again, with their own stamps.',
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
+    parser.description = 'Publish the joint states of a recording again, with their own stamps.'
+    parser.epilog = _EPILOG
     parser.add_argument(
         'recording',
         type=Path,
@@ -60,10 +54,9 @@ def add_command(commands: Any) -> None:
         help='where the joint states are, in any namespace (default: %(default)s)',
     )
     parser.add_argument('--namespace', default='', metavar='NS', help='of the topics to publish')
-    parser.set_defaults(run=replay, prog='dcdrw replay')
 
 
-def replay(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     try:
         import rclpy
@@ -73,7 +66,8 @@ def replay(options: argparse.Namespace) -> int:
             'ros-jazzy-common-interfaces'
         ) from None
     from dcdrw.nodes.replay_node import Part, ReplayNode
-    from dcdrw_msgs_py.node import run, steady_clock
+    from dcdrw_msgs_py.node import run as run_node
+    from dcdrw_msgs_py.node import steady_clock
 
     names = _names(options.rig)
     with Recording(options.recording) as recording:
@@ -102,7 +96,7 @@ def replay(options: argparse.Namespace) -> int:
                 rclpy.shutdown()
 
         namespace = ['-r', f'__ns:=/{options.namespace.strip("/")}'] if options.namespace else []
-        status = run('dcdrw replay', make, ['--ros-args', *namespace])
+        status = run_node('dcdrw replay', make, ['--ros-args', *namespace])
         if node is None:
             return status
         if sys.stderr.isatty():

@@ -4,7 +4,6 @@ import argparse
 import csv
 import sys
 from pathlib import Path
-from typing import Any
 
 from dcdrw.trials.day import STEP_COLUMNS, TRIAL_COLUMNS, Trial, new_name, open_trial, step_rows, table
 from dcdrw.trials.report_page import page
@@ -22,15 +21,10 @@ example:
 """
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        'report',
-        help='recorded trials on one page',
-        epilog=_EPILOG,
-        description='Compare recorded trials on one page: pictures, verdicts, how fast each came into step.',
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
+    parser.description = 'Compare recorded trials on one page: pictures, verdicts, how fast each came into step.'
+    parser.epilog = _EPILOG
     parser.add_argument('recordings', type=Path, nargs='+', metavar='RECORDING')
     parser.add_argument('--out', type=Path, required=True, metavar='REPORT.html', help='the page to write')
     parser.add_argument('--title', default='Trials', metavar='TEXT', help='its heading (default: %(default)s)')
@@ -46,7 +40,6 @@ def add_command(commands: Any) -> None:
         metavar='NAME',
         help='where the joint states are, in any namespace (default: %(default)s)',
     )
-    parser.set_defaults(run=run, prog='dcdrw report')
 
 
 def run(options: argparse.Namespace) -> int:

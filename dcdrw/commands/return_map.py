@@ -21,15 +21,10 @@ real and imaginary part.
 """
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        'map',
-        help='multipliers and regressions of the return map',
-        epilog=_EPILOG,
-        description='Find the limit cycle of a pair and tell how fast the pair comes to it.',
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
+    parser.description = 'Find the limit cycle of a pair and tell how fast the pair comes to it.'
+    parser.epilog = _EPILOG
     add_rig_options(parser)
     parser.add_argument(
         '--steps',
@@ -39,7 +34,6 @@ def add_command(commands: Any) -> None:
         help=f'steps of each of the {len(PHASES)} trials (default: %(default)s)',
     )
     parser.add_argument('--json', type=Path, metavar='OUT.json', help='write everything here, too')
-    parser.set_defaults(run=run, prog='dcdrw map')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -5,13 +5,13 @@ import csv
 import json
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from dcdrw.arguments import count, positive
 from dcdrw_sim.motion.cases import DEFAULT_STRIKES, Case, read_cases, run_record
-from dcdrw_sim.motion.trajectory import Run, Trajectory, run
+from dcdrw_sim.motion.trajectory import Run, Trajectory
+from dcdrw_sim.motion.trajectory import run as integrate
 
 _EPILOG = """\
 A case is {"g", "slope", "l": [2], "m": [2], "alpha": [2], "k", "b", "D0", "S0", "x0": [theta1, omega1, theta2,
@@ -25,15 +25,10 @@ MOST_SAMPLES = 20_000_000
 """Samples of a trajectory file, which must fit into memory."""
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        'simulate',
-        help='integrate cases from a JSON file',
-        epilog=_EPILOG,
-        description='Integrate cases to their strikes, which are located to rounding error.',
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
+    parser.description = 'Integrate cases to their strikes, which are located to rounding error.'
+    parser.epilog = _EPILOG
     parser.add_argument('cases', type=Path, metavar='CASE.json', help='one case or a list of cases')
     parser.add_argument(
         '--strikes',
@@ -55,17 +50,16 @@ def add_command(commands: Any) -> None:
         metavar='HZ',
         help='samples per unit of time of the trajectory (default: %(default)g)',
     )
-    parser.set_defaults(run=simulate, prog='dcdrw simulate')
 
 
-def simulate(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     cases, is_list = read_cases(options.cases)
     if options.trajectory and options.trajectory.suffix not in _WRITERS:
         raise ValueError(f'--trajectory must end in {" or ".join(_WRITERS)}, got {options.trajectory}')
     runs = []
     for case in cases:
-        result = run(case.rig, case.state, strikes=options.count or case.listed_strikes)
+        result = integrate(case.rig, case.state, strikes=options.count or case.listed_strikes)
         runs.append(result)
         print(f'{case.name}: {len(result.strikes)} strikes in {result.duration:.6g}; {result.reason}', file=sys.stderr)
     records = [run_record(case, result) for case, result in zip(cases, runs, strict=True)]

@@ -36,15 +36,10 @@ examples:
 """
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        'sweep',
-        help='which couplers synchronize, and how fast',
-        epilog=_EPILOG,
-        description='Simulate, judge and measure a rig over any two of its parameters.',
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
+    parser.description = 'Simulate, judge and measure a rig over any two of its parameters.'
+    parser.epilog = _EPILOG
     parser.add_argument('--out', type=Path, required=True, metavar='OUT.nc', help='the netCDF file to make')
     add_rig_options(parser)
     parser.add_argument('--x', type=axis, metavar='AXIS', help="(default: k over the paper's range)")
@@ -73,7 +68,7 @@ def add_command(commands: Any) -> None:
     where = parser.add_mutually_exclusive_group()
     where.add_argument('--workers', type=count, metavar='N', help='cores to use (default: all)')
     where.add_argument('--scheduler', metavar='ADDRESS', help='run on the Dask cluster of this scheduler')
-    parser.set_defaults(run=run, prog='dcdrw sweep', preset='paper-sweep')
+    parser.set_defaults(preset='paper-sweep')
 
 
 def axis(text: str) -> Axis:
@@ -169,7 +164,8 @@ class Bar:
     def __enter__(self) -> 'Bar':
         from tqdm import tqdm
 
-        self._make, self._bar = tqdm, None  # type: Any, Any
+        self._make: Any = tqdm
+        self._bar: Any = None
         return self
 
     def __call__(self, progress: Progress) -> None:

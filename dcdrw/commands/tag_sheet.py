@@ -30,13 +30,11 @@ class SheetParams(NamedTuple):
     tags: TagParams = TagParams()
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        'tags',
-        help='print the tags of the wheels, true to scale',
-        description='Write the AprilTags of a rig to a PDF: true to scale, with a ruler to check it, cut lines and '
-        'instructions for mounting.',
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
+    parser.description = (
+        'Write the AprilTags of a rig to a PDF: true to scale, with a ruler to check it, cut lines and '
+        'instructions for mounting.'
     )
     parser.add_argument('--out', type=Path, required=True, metavar='FILE.pdf', help='the sheet; must not exist')
     parser.add_argument(
@@ -47,7 +45,6 @@ def add_command(commands: Any) -> None:
         f'{1000 * TagParams().size:g} mm on each hub)',
     )
     parser.add_argument('--paper', choices=PAPERS, default='a4', help='(default: %(default)s)')
-    parser.set_defaults(run=run, prog='dcdrw tags')
 
 
 def run(options: argparse.Namespace) -> int:

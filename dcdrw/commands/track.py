@@ -75,15 +75,10 @@ class TrackingParams(NamedTuple):
     source: SourceParams = SourceParams()
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        'track',
-        help='track the wheels in a video, and judge the trial',
-        epilog=_EPILOG,
-        description='From a video of the rig to joint states, phase, summary and picture.',
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
+    parser.description = 'From a video of the rig to joint states, phase, summary and picture.'
+    parser.epilog = _EPILOG
     add_film_arguments(parser)
     parser.add_argument(
         '--out',
@@ -97,7 +92,6 @@ def add_command(commands: Any) -> None:
         metavar='FILE.mp4',
         help='make a video with tags, hubs, spokes and stance legs drawn in; must not exist',
     )
-    parser.set_defaults(run=track, prog='dcdrw track')
 
 
 def add_film_arguments(parser: argparse.ArgumentParser) -> None:
@@ -137,7 +131,7 @@ def add_film_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--quiet', action='store_true', help='no live progress')
 
 
-def track(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     film = Film(options)
     trial_params = TrialParams()

@@ -9,7 +9,7 @@ import time
 from contextlib import nullcontext
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dcdrw.arguments import domain, number, positive
 from dcdrw.recordings.recorder import require_libraries
@@ -39,15 +39,10 @@ row. Where the camera stands and what its pictures are like are parameters of vi
 """
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        'trial',
-        help='run a trial in simulation, live, and judge it',
-        epilog=_EPILOG,
-        description='Run simulator, phase estimator and synchronization monitor as processes over DDS.',
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
+    parser.description = 'Run simulator, phase estimator and synchronization monitor as processes over DDS.'
+    parser.epilog = _EPILOG
     add_rig_options(parser)
     parser.add_argument(
         '--initial-phase', type=number, metavar='PERCENT', help='phase at the start, percent of a step (default: 21.6)'
@@ -67,10 +62,9 @@ def add_command(commands: Any) -> None:
     parser.add_argument('--domain', type=domain, metavar='N', help='ROS domain to use instead of a free one')
     parser.add_argument('--note', default='', metavar='TEXT', help='what to keep with the recording')
     parser.add_argument('--quiet', action='store_true', help='no live progress')
-    parser.set_defaults(run=trial, prog='dcdrw trial')
 
 
-def trial(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     try:
         import rclpy  # noqa: F401

@@ -3,7 +3,6 @@
 import argparse
 import math
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
@@ -22,15 +21,10 @@ is for display, without inertia. Spoke 0, which stands at zero rotation, is blac
 """
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        'urdf',
-        help='the rig as a URDF, for RViz and Foxglove',
-        epilog=_EPILOG,
-        description='Write a URDF with the dimensions of a rig.',
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
+    parser.description = 'Write a URDF with the dimensions of a rig.'
+    parser.epilog = _EPILOG
     add_rig_options(parser)
     parser.add_argument('--out', type=Path, metavar='FILE.urdf', help='where to write (default: print)')
     parser.add_argument(
@@ -38,7 +32,6 @@ def add_command(commands: Any) -> None:
         action='store_true',
         help="hubs at the coupler's rest length, for a source that does not tell its length",
     )
-    parser.set_defaults(run=run, prog='dcdrw urdf')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -2,6 +2,7 @@
 
 from typing import Any, NamedTuple
 
+from dcdrw import entry
 from dcdrw.drawings.rig_markers import MarkerParams
 from dcdrw.recordings.recorder import RecorderParams
 from dcdrw_msgs_py.rig import RigParams
@@ -45,7 +46,6 @@ class Executable(NamedTuple):
     """One node."""
 
     name: str
-    module: str
     doc: str
     parameters: tuple[type[tuple[Any, ...]], ...]
     subscribes: tuple[Topic, ...]
@@ -54,10 +54,14 @@ class Executable(NamedTuple):
     by_choice: tuple[Topic, ...] = ()
     """Of the topics, those that only other parameters than the default ones bring."""
 
+    @property
+    def module(self) -> str:
+        """The module of its node."""
+        return entry.EXECUTABLES[self.name]
+
 
 SIMULATOR = Executable(
     'simulator',
-    'dcdrw_sim.rig.simulator_node',
     'the rig in simulation, in the place of the real one',
     (RigParams, SimulatorParams),
     (COUPLER_FORCE_COMMAND,),
@@ -66,7 +70,6 @@ SIMULATOR = Executable(
 )
 PHASE_ESTIMATOR = Executable(
     'phase_estimator',
-    'dcdrw_tracker.gait.phase_estimator_node',
     'from wheel rotations to phase, steps and footfalls',
     (PhaseParams,),
     (JOINT_STATES,),
@@ -74,7 +77,6 @@ PHASE_ESTIMATOR = Executable(
 )
 SYNC_MONITOR = Executable(
     'sync_monitor',
-    'dcdrw_tracker.gait.sync_monitor_node',
     'how far from walking in step, and whether it stays there',
     (SyncParams,),
     (PHASE_STATE,),
@@ -83,7 +85,6 @@ SYNC_MONITOR = Executable(
 
 MARKERS = Executable(
     'rig_markers',
-    'dcdrw.nodes.rig_markers_node',
     'the rig as markers, for RViz and Foxglove',
     (MarkerParams,),
     (JOINT_STATES, DIAGNOSTICS),
@@ -92,7 +93,6 @@ MARKERS = Executable(
 
 RECORDER = Executable(
     'recorder',
-    'dcdrw.nodes.recorder_node',
     'while it records: every topic but images and markers, into a recording',
     (RecorderParams,),
     (),
@@ -102,7 +102,6 @@ RECORDER = Executable(
 
 VIRTUAL_CAMERA = Executable(
     'virtual_camera',
-    'dcdrw_sim.camera.virtual_camera_node',
     'pictures of the rig, as a camera on its left would take them',
     (SceneParams, ViewParams, LookParams, TagParams, ShutterParams),
     (JOINT_STATES,),
@@ -111,7 +110,6 @@ VIRTUAL_CAMERA = Executable(
 
 TAG_TRACKER = Executable(
     'tag_tracker',
-    'dcdrw_tracker.node.tag_tracker_node',
     "from a camera's pictures, or motion capture, to wheel rotations",
     (TagParams, PairViewParams, TrackParams, PoseParams, SourceParams),
     (IMAGE_RAW, IMAGE_COMPRESSED, CAMERA_INFO, FRONT_POSE, REAR_POSE),

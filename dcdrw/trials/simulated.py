@@ -133,7 +133,13 @@ class SimulatedTrial:
             if self._filmed and node in (SIMULATOR, VIRTUAL_CAMERA):
                 arguments += ['-r', f'{JOINT_STATES.name}:={TRUTH}']
             self._nodes.append(
-                NodeProcess(node.name, node.module, arguments, self._environment, self._folder / f'{node.name}.log')
+                NodeProcess(
+                    node.name,
+                    'dcdrw.entry',
+                    [node.name, *arguments],
+                    self._environment,
+                    self._folder / f'{node.name}.log',
+                )
             )
         self._say('starting the nodes ...')
         self._spin_until(self._all_at_work, START_SECONDS, 'no data came through the nodes')

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -217,7 +218,7 @@ def test_wrong_input_is_told_in_one_line_and_leaves_nothing(tmp_path, monkeypatc
 
 
 def test_a_codec_that_is_not_there_is_told(tmp_path, capsys, monkeypatch):
-    monkeypatch.setitem(__import__('dcdrw.commands.film').film.CODECS, '.mkv', 'ZZZZ')
+    monkeypatch.setitem(import_module('dcdrw.commands.film').CODECS, '.mkv', 'ZZZZ')
     assert main(['film', '--out', str(tmp_path / 'e.mkv'), '--seconds', '1', *SMALL]) == 2
     assert 'does not write ZZZZ into' in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

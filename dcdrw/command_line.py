@@ -1,0 +1,130 @@
+"""Reads the command line and runs the command that it names."""
+
+import argparse
+import signal
+import sys
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from difflib import get_close_matches
+from importlib import import_module
+from typing import Any, NoReturn
+
+from dcdrw.cli import Command
+
+
+class CommandParser(argparse.ArgumentParser):
+    """The parser of one command: its module is imported, and tells the arguments, when the command is chosen."""
+
+    def __init__(self, module: str = '', **kwargs: Any) -> None:
+        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **kwargs)
+        self._module = module
+
+    def load(self) -> None:
+        """Import the command's module and take its arguments."""
+        if self._module:
+            module = import_module(f'dcdrw.commands.{self._module}')
+            self._module = ''
+            module.add_arguments(self)
+            self.set_defaults(run=module.run, prog=self.prog)
+
+    @property
+    def option_strings(self) -> list[str]:
+        """Its options as they are written."""
+        return list(self._option_string_actions)
+
+    def error(self, message: str) -> NoReturn:
+        """End with the message, and where to read on."""
+        self.exit(2, f'{self.prog}: {message} ({self.prog} --help tells what it takes)\n')
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As argparse has it, once the arguments are known."""
+        self.load()
+        return super().parse_known_args(args, namespace)
+
+
+class Interrupted(KeyboardInterrupt):
+    """A signal asked for an end."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self.number = number
+
+
+class CommandLine:
+    """The commands, by their names."""
+
+    def __init__(self, commands: Mapping[str, Command], description: str, epilog: str) -> None:
+        self._commands = commands
+        self.parser = CommandParser(prog='dcdrw', description=description, epilog=epilog)
+        self.parser.add_argument('--version', action='store_true', help='tell the version, and end')
+        listed = self.parser.add_subparsers(title='commands', metavar='COMMAND', parser_class=CommandParser)
+        self._parsers = {
+            name: listed.add_parser(name, help=command.help, module=command.module)
+            for name, command in commands.items()
+        }
+
+    def run(self, arguments: Sequence[str]) -> int:
+        """Run the command that these arguments name; returns the exit status."""
+        chosen = next((argument for argument in arguments if not argument.startswith('-')), None)
+        if chosen and chosen not in self._commands:
+            mend = _suggestion(chosen, self._commands) or '; dcdrw --help lists them'
+            print(f'dcdrw: there is no command {chosen!r}{mend}', file=sys.stderr)
+            return 2
+        options, unknown = self.parser.parse_known_args(arguments)
+        if options.version:
+            print(f'dcdrw {_version()}')
+            return 0
+        if chosen is None:
+            self.parser.print_help()
+            return 0
+        prog: str = options.prog
+        if unknown:
+            known = self._parsers[chosen].option_strings
+            print(f'{prog}: there is no argument {unknown[0]!r}{_suggestion(unknown[0], known)}', file=sys.stderr)
+            return 2
+        try:
+            with _raised_signals():
+                status: int = options.run(options)
+            return status
+        except KeyboardInterrupt as interrupt:
+            print(f'{prog}: interrupted', file=sys.stderr)
+            return 128 + getattr(interrupt, 'number', signal.SIGINT)
+        except (ValueError, OSError) as error:
+            print(f'{prog}: {error}', file=sys.stderr)
+            return 2
+
+
+def _suggestion(word: str, known: Mapping[str, Any] | Sequence[str]) -> str:
+    near = get_close_matches(word, known, 1)
+    return f'; did you mean {near[0]}?' if near else ''
+
+
+@contextmanager
+def _raised_signals() -> Iterator[None]:
+    """Signals that ask for an end raise `Interrupted` in the main thread, so that all is left in order."""
+
+    def interrupt(number: int, _: object) -> None:
+        raise Interrupted(number)
+
+    if threading.current_thread() is not threading.main_thread():  # where no signal comes
+        yield
+        return
+    numbers = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # by nohup
+        numbers.append(signal.SIGHUP)
+    before = {number: signal.signal(number, interrupt) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version('dcdrw')
+    except PackageNotFoundError:
+        return '(not installed)'

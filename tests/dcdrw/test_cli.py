@@ -1,0 +1,95 @@
+"""The command line answers at once: a command's module is imported when the command is chosen."""
+
+import subprocess
+import sys
+from importlib import import_module
+
+import pytest
+
+from dcdrw.cli import COMMANDS, main
+from tests import ROOT
+
+HEAVY = {
+    'numpy',
+    'scipy',
+    'numba',
+    'rclpy',
+    'matplotlib',
+    'cv2',
+    'yaml',
+    'xarray',
+    'dask',
+    'aiohttp',
+    'mcap',
+    'rosbags',
+}
+
+
+def imported(*arguments: str) -> set[str]:
+    """The modules that a command line has imported by its end."""
+    code = (
+        'import atexit, sys; from dcdrw.cli import main; '
+        'atexit.register(lambda: print("\\0", *sys.modules)); sys.exit(main(sys.argv[1:]))'
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', code, *arguments], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    return set(done.stdout.rpartition('\0')[2].split())
+
+
+@pytest.mark.parametrize('arguments', [(), ('--help',), ('--version',), ('trail',)], ids=' '.join)
+def test_nothing_heavy_is_imported_before_a_command_is_chosen(arguments):
+    modules = imported(*arguments)
+    assert 'dcdrw.cli' in modules
+    assert not HEAVY & modules
+    assert not {name for name in modules if name.startswith(('dcdrw_', 'dcdrw.commands.'))}
+
+
+def test_a_command_imports_itself_alone():
+    modules = imported('map', '--help')
+    assert {name for name in modules if name.startswith('dcdrw.commands.')} == {'dcdrw.commands.return_map'}
+
+
+def test_no_arguments_bring_the_help(capsys):
+    assert main([]) == 0
+    told = capsys.readouterr().out
+    assert all(f' {name} ' in told for name in COMMANDS)
+
+
+def test_help_is_what_the_table_says(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(['--help'])
+    assert end.value.code == 0
+    told = ' '.join(capsys.readouterr().out.split())
+    assert all(f'{name} {command.help}' in told for name, command in COMMANDS.items())
+
+
+@pytest.mark.parametrize('command', COMMANDS.values(), ids=COMMANDS)
+def test_every_command_has_what_the_command_line_asks_of_it(command):
+    module = import_module(f'dcdrw.commands.{command.module}')
+    assert module.__doc__
+    assert callable(module.add_arguments)
+    assert callable(module.run)
+
+
+@pytest.mark.parametrize(('word', 'meant'), [('trail', 'trial'), ('analyse', 'analyze'), ('repley', 'replay')])
+def test_a_misspelt_command_is_asked_about(capsys, word, meant):
+    assert main([word]) == 2
+    assert capsys.readouterr().err == f'dcdrw: there is no command {word!r}; did you mean {meant}?\n'
+
+
+def test_a_word_that_resembles_nothing_gets_no_suggestion(capsys):
+    assert main(['xyzzy']) == 2
+    assert capsys.readouterr().err == "dcdrw: there is no command 'xyzzy'; dcdrw --help lists them\n"
+
+
+def test_a_misspelt_option_is_asked_about(capsys):
+    assert main(['map', '--stpes', '3']) == 2
+    assert capsys.readouterr().err == "dcdrw map: there is no argument '--stpes'; did you mean --steps?\n"
+
+
+def test_a_wrong_option_gets_one_line(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(['map', '--steps', 'many'])
+    assert end.value.code == 2
+    assert capsys.readouterr().err.count('\n') == 1
