@@ -253,4 +253,3 @@ def run(name: str, make_node: Callable[[], Node], args: list[str] | None = None)
     for number in (signal.SIGINT, signal.SIGTERM):  # Python itself ends now, and would die of a second signal
         signal.signal(number, signal.SIG_IGN)
     return 0
-

@@ -15,14 +15,20 @@ ALLOWED = {
     'dcdrw_tracker': {'dcdrw_msgs_py'},
     'dcdrw': {'dcdrw_msgs_py', 'dcdrw_sim', 'dcdrw_tracker'},
 }
-KNOW_ROS = {'dcdrw_msgs_py.node', 'dcdrw_msgs_py.messages', 'dcdrw_msgs_py.image_messages', 'dcdrw.nodes.observer'}
+KNOW_ROS = {
+    'dcdrw_msgs_py.node',
+    'dcdrw_msgs_py.executor',
+    'dcdrw_msgs_py.messages',
+    'dcdrw_msgs_py.image_messages',
+    'dcdrw.nodes.observer',
+}
 MODULES = [
     '.'.join(path.relative_to(ROOT).with_suffix('').parts)
     for package in PACKAGES
     for path in sorted((ROOT / package).rglob('*.py'))
     if path.stem != '__init__'
 ]
-CORES = [module for module in MODULES if module not in KNOW_ROS and not module.endswith('_node')]
+CORES = [module for module in MODULES if module not in KNOW_ROS and not module.endswith(('_node', '__main__'))]
 
 BLOCK_ROS = """
 import sys
