@@ -1,0 +1,149 @@
+"""Readings of the sensors on the legs from a CSV file, as laboratories keep them."""
+
+import csv
+import math
+import re
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from itertools import chain
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dcdrw_control.legs.samples import (
+    ContactReading,
+    HipReading,
+    ImuReading,
+    Leg,
+    LegReading,
+    Reading,
+    WrenchReading,
+)
+from dcdrw_msgs_py.samples import SECOND
+
+Floats = NDArray[np.float64]
+
+FASTEST = 35.0
+"""No leg turns faster [rad/s], and gyroscopes end at 2000 degrees per second: a file with larger rates is in deg/s."""
+_COLUMN = re.compile(r'(?:(front|rear)_)?(left|right)_(acc_[xyz]|gyr_[xyz]|contact|force|hip|hip_rate)')
+_TIMES = {'time': 1.0, 'time_s': 1.0, 'stamp_ns': 1.0 / SECOND}
+
+
+class LegTable(NamedTuple):
+    """What a file holds."""
+
+    readings: list[LegReading]
+    """In the order of time."""
+    rate: float
+    """Samples per second [Hz]."""
+    degrees: bool
+    """Whether its angular rates are taken to be in degrees per second."""
+
+
+def read_legs(path: Path, rate: float = math.nan) -> LegTable:
+    """Read a CSV file.
+
+    The columns are named, in one row or in two (sensor, axis): a first column `time` [s], `stamp_ns` or the sample's
+    number, then for each leg `left_acc_x`, …, `left_gyr_z`, `left_contact` (0 or 1), `left_force` [N], `left_hip`
+    [rad] or `left_hip_rate` [rad/s], with `front_` or `rear_` before it where there are two halves. Columns of other
+    names are passed over. A file of two columns without names is the time [s] and the left foot's vertical force [N].
+
+    Args:
+        path: the file.
+        rate: samples per second [Hz], in the place of the file's own times.
+
+    Raises:
+        ValueError: there is no column that is known, a value is no number, or the time is unknown or does not grow.
+        OSError: the file cannot be read.
+
+    """
+    names, table = _read(path)
+    seconds = _seconds(path, names[0], table[:, 0], rate)
+    stamps = np.round(seconds * SECOND).astype(np.int64).tolist()
+    columns: dict[Leg, dict[str, Floats]] = defaultdict(dict)
+    for name, column in zip(names[1:], table[:, 1:].T, strict=True):
+        found = _COLUMN.fullmatch(name)
+        if found:
+            columns[Leg(found[1] or 'front', found[2])][found[3]] = column
+    rates = [column for quantities in columns.values() for name, column in quantities.items() if name[:3] == 'gyr']
+    degrees = bool(rates) and float(np.nanmax(np.abs(rates))) > FASTEST
+    parts = [
+        [LegReading(stamp, leg, reading) for stamp, reading in zip(stamps, made, strict=True)]
+        for leg, quantities in columns.items()
+        for made in _readings(path, leg, quantities, math.radians(1.0) if degrees else 1.0)
+    ]
+    if not parts:
+        raise ValueError(
+            f'{path} has no column of a leg, as left_gyr_x, left_force or left_contact: {", ".join(names)}'
+        )
+    readings = sorted(chain.from_iterable(parts), key=lambda reading: reading.stamp_ns)
+    return LegTable(readings, (len(seconds) - 1) / float(seconds[-1] - seconds[0]), degrees)
+
+
+def _read(path: Path) -> tuple[list[str], Floats]:
+    with path.open(newline='', encoding='utf-8') as file:
+        rows = [row for row in csv.reader(file) if row]
+    heads = [row for row in rows[:2] if not _is_number(row[-1])]
+    if len(heads) == 2:
+        names = [f'{sensor.removesuffix("_sensor")}_{axis}' for sensor, axis in zip(*heads, strict=False)]
+        names[0] = 'sample'
+    elif heads:
+        names = [name.strip() for name in heads[0]]
+    elif rows and len(rows[0]) == 2:
+        names = ['time', 'left_force']
+    else:
+        raise ValueError(f'{path} names no columns: its first row should be time,left_gyr_x,…')
+    try:
+        table = np.array([[float(cell) if cell else math.nan for cell in row] for row in rows[len(heads) :]])
+    except ValueError as error:
+        raise ValueError(f'{path}: {error}') from None
+    if table.ndim != 2 or table.shape[1] != len(names) or len(table) < 2:
+        raise ValueError(f'{path}: every row should have {len(names)} numbers, and there should be some')
+    return names, table
+
+
+def _seconds(path: Path, name: str, first: Floats, rate: float) -> Floats:
+    if not math.isnan(rate):
+        seconds = np.arange(len(first)) / rate
+    elif name in _TIMES:
+        seconds = (first - first[0]) * _TIMES[name]
+    else:
+        raise ValueError(f'{path} has no column time or stamp_ns: tell how many samples a second it has (--rate)')
+    if not (np.diff(seconds) > 0.0).all():
+        raise ValueError(f'{path}: the time in column {name} must grow from row to row')
+    return seconds
+
+
+def _readings(path: Path, leg: Leg, quantities: dict[str, Floats], unit: float) -> Iterator[list[Reading]]:
+    """The readings of each sensor of a leg."""
+    if any(name[:3] in ('gyr', 'acc') for name in quantities):
+        missing = [name for kind in ('gyr', 'acc') for name in (f'{kind}_{axis}' for axis in 'xyz')]
+        missing = [name for name in missing if name not in quantities]
+        if missing:
+            raise ValueError(f'{path}: the {leg.side} leg has no column {leg.side}_{missing[0]}')
+        turning, pulling = (
+            np.stack([quantities[f'{kind}_{axis}'] for axis in 'xyz'], axis=1) for kind in ('gyr', 'acc')
+        )
+        yield [ImuReading(tuple(r), tuple(a)) for r, a in zip((turning * unit).tolist(), pulling.tolist(), strict=True)]
+    if 'contact' in quantities:
+        yield [ContactReading(touches) for touches in (quantities['contact'] > 0.5).tolist()]
+    if 'force' in quantities:
+        yield _each(WrenchReading, quantities['force'])
+    if 'hip' in quantities:
+        yield _each(
+            HipReading, quantities['hip'], quantities.get('hip_rate', np.full(len(quantities['hip']), math.nan))
+        )
+
+
+def _each(make: Callable[..., Reading], *columns: Floats) -> list[Reading]:
+    return [make(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True

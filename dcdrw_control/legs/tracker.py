@@ -1,0 +1,211 @@
+"""The leg tracker: from readings of the sensors to the phase of each leg, and to the halves as wheels.
+
+Plain data in, plain data out: time arrives in the readings, and what is refused or missing is counted.
+"""
+
+import math
+from typing import Any, Literal, NamedTuple, get_args
+
+from dcdrw_control.legs.contact import ContactDetector, ForceDetector
+from dcdrw_control.legs.events import Event
+from dcdrw_control.legs.half import Half
+from dcdrw_control.legs.hip import HipDetector
+from dcdrw_control.legs.imu import ImuDetector
+from dcdrw_control.legs.params import Kind, LegParams
+from dcdrw_control.legs.phase import LegPhase, LegSample
+from dcdrw_control.legs.samples import KIND_OF, LEGS, Leg, LegPhases, LegReading, LegUpdate, Reading
+from dcdrw_msgs_py.samples import SECOND, JointSample, Turn
+
+Refusal = Literal['unreadable', 'not finite', 'repeated', 'reversed', 'future', 'another sensor']
+"""Why a reading is refused: its message makes no sense, a value is no number, its stamp stands still, goes back or
+lies ahead of the clock, or another kind of sensor tells of the same leg."""
+RESTART = 1.0
+"""Stamps that go back by more are those of a source that starts anew, as a recording that is played again [s]."""
+
+_Detector = ImuDetector | ContactDetector | ForceDetector | HipDetector
+_DETECTORS: dict[Kind, type[_Detector]] = {
+    'imu': ImuDetector,
+    'contact': ContactDetector,
+    'wrench': ForceDetector,
+    'hip': HipDetector,
+}
+
+
+class HeelStrike(NamedTuple):
+    """One heel strike of a leg."""
+
+    leg: Leg
+    stamp_ns: int
+    known_ns: int
+    """The stamp of the reading that made it certain."""
+
+
+class LegStatus(NamedTuple):
+    """A snapshot of one leg."""
+
+    kind: Kind | None
+    """The sensor that tells of it; None where none does."""
+    mounted: bool
+    """Whether the sensor's mounting is known."""
+    known: bool
+    """Whether its phase is known."""
+    strikes: int
+    missed: int
+    """Strikes that were overdue and counted without having been seen."""
+    doubled: int
+    """Strikes that were taken for a bounce, and not counted."""
+    gaps: int
+    """How often its sensor was silent."""
+    period: float
+    """The usual stride [s]; NaN before one was seen."""
+
+
+class LegTrackerStatus(NamedTuple):
+    """A snapshot of the tracker, for diagnostics."""
+
+    stamp_ns: int
+    """Of the newest reading; 0 before the first."""
+    legs: dict[Leg, LegStatus]
+    refused: dict[Refusal, int]
+
+
+class LegTracker:
+    """Follows the legs of both halves, each by the kind of sensor that is heard of it first."""
+
+    def __init__(self, params: LegParams) -> None:
+        self.params = params
+        self._tracks = {leg: _Track() for leg in LEGS}
+        self._halves = {'front': Half(params.front.alpha), 'rear': Half(params.rear.alpha)}
+        self._refused: dict[Refusal, int] = dict.fromkeys(get_args(Refusal), 0)
+        self._stamp_ns = 0
+        self._published_ns: int | None = None
+        self.strikes: list[HeelStrike] = []
+        """Those that the last reading brought."""
+
+    def configure(self, params: LegParams) -> None:
+        """Take changed parameters."""
+        self.params = params
+
+    def refuse(self, why: Refusal) -> None:
+        """Count a reading that is of no use; callers report what they cannot even convert (`unreadable`)."""
+        self._refused[why] += 1
+
+    def update(self, reading: LegReading, now_ns: int = 0) -> LegUpdate | None:
+        """Take the next reading; None where it is refused, or nothing is due to be published.
+
+        Args:
+            reading: of any sensor; those of one sensor in the order of time.
+            now_ns: the node's clock; 0 where it is unknown.
+
+        """
+        self.strikes = []
+        stamp_ns, leg, _ = reading
+        track = self._tracks[leg]
+        refusal = self._refusal(reading, track, now_ns)
+        if refusal:
+            self.refuse(refusal)
+            return None
+        if track.stamp_ns is not None and stamp_ns - track.stamp_ns > self._silence_ns:
+            track.lose()
+        elif track.stamp_ns is not None and stamp_ns < track.stamp_ns:
+            track.lose()
+            self._stamp_ns, self._published_ns = 0, None
+        for event in track.take(reading):
+            if track.phase.take(event):
+                self.strikes.append(HeelStrike(leg, event.stamp_ns, stamp_ns))
+        self._stamp_ns = max(self._stamp_ns, stamp_ns)
+        since_ns = math.inf if self._published_ns is None else self._stamp_ns - self._published_ns
+        if since_ns < (1 if self.strikes else 0.99 * SECOND / self.params.rate):
+            return None
+        self._published_ns = self._stamp_ns
+        return self._at(self._stamp_ns)
+
+    def status(self) -> LegTrackerStatus:
+        """A snapshot."""
+        legs = {leg: track.status(self._is_heard(track)) for leg, track in self._tracks.items()}
+        return LegTrackerStatus(self._stamp_ns, legs, self._refused.copy())
+
+    @property
+    def _silence_ns(self) -> float:
+        return self.params.silence * SECOND
+
+    def _is_heard(self, track: '_Track') -> bool:
+        return track.stamp_ns is not None and self._stamp_ns - track.stamp_ns <= self._silence_ns
+
+    def _refusal(self, reading: LegReading, track: '_Track', now_ns: int) -> Refusal | None:
+        stamp_ns, _, values = reading
+        if not _finite(values):
+            return 'not finite'
+        if now_ns and stamp_ns - now_ns > self.params.max_future * SECOND:
+            return 'future'
+        if track.stamp_ns is None:
+            return None
+        if KIND_OF[type(values)] != track.kind and abs(stamp_ns - track.stamp_ns) <= self._silence_ns:
+            return 'another sensor'
+        if track.stamp_ns - RESTART * SECOND <= stamp_ns <= track.stamp_ns:
+            return 'repeated' if stamp_ns == track.stamp_ns else 'reversed'
+        return None
+
+    def _at(self, stamp_ns: int) -> LegUpdate:
+        samples = {
+            leg: track.phase.at(stamp_ns) if self._is_heard(track) else None for leg, track in self._tracks.items()
+        }
+        turns = {
+            leg: Turn(math.tau * sample.strides, math.tau * sample.rate) for leg, sample in samples.items() if sample
+        }
+        front, rear = (half.update(_pair(samples, name)) for name, half in self._halves.items())
+        joints = JointSample(stamp_ns, front or Turn(), rear or Turn()) if front or rear else None
+        return LegUpdate(LegPhases(stamp_ns, turns) if turns else None, joints)
+
+
+class _Track:
+    """One leg: the sensor that tells of it, and its phase."""
+
+    def __init__(self) -> None:
+        self.kind: Kind | None = None
+        self.stamp_ns: int | None = None
+        self.phase = LegPhase()
+        self._detector: Any = None
+        self._gaps = 0
+
+    def lose(self) -> None:
+        """Its sensor was silent: what it did meanwhile is unknown."""
+        self._gaps += 1
+        self.phase.lose()
+        self._detector.reset()
+
+    def take(self, reading: LegReading) -> list[Event]:
+        """The events that a reading makes certain."""
+        stamp_ns, _, values = reading
+        kind = KIND_OF[type(values)]
+        if kind != self.kind:
+            self.kind, self._detector = kind, _DETECTORS[kind]()
+        self.stamp_ns = stamp_ns
+        events: list[Event] = self._detector.update(stamp_ns, *values)
+        return events
+
+    def status(self, heard: bool) -> LegStatus:
+        """A snapshot."""
+        phase = self.phase
+        return LegStatus(
+            self.kind if heard else None,
+            getattr(self._detector, 'mounted', True),
+            heard and phase.known,
+            phase.strikes,
+            phase.missed,
+            phase.doubled,
+            self._gaps,
+            phase.period,
+        )
+
+
+def _pair(samples: dict[Leg, LegSample | None], half: str) -> tuple[LegSample | None, LegSample | None]:
+    return samples[Leg(half, 'left')], samples[Leg(half, 'right')]
+
+
+def _finite(values: Reading) -> bool:
+    """Whether all values are numbers; a hip's rate may be unknown."""
+    flat = [part for value in values[:2] for part in (value if isinstance(value, tuple) else (value,))]
+    if KIND_OF[type(values)] == 'hip':
+        return math.isfinite(flat[0]) and not math.isinf(flat[1])
+    return all(map(math.isfinite, flat))

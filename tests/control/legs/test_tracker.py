@@ -1,0 +1,118 @@
+import math
+
+import pytest
+
+from dcdrw_control.legs.params import LegParams
+from dcdrw_control.legs.samples import (
+    LEGS,
+    ContactReading,
+    HipReading,
+    ImuReading,
+    Leg,
+    LegReading,
+    WrenchReading,
+)
+from dcdrw_control.legs.tracker import LegTracker
+from tests.control.legs.gait import follow
+
+LEFT, RIGHT = Leg('front', 'left'), Leg('front', 'right')
+OFFSETS = dict(zip(LEGS, (0.0, 0.5, 0.75, 0.25), strict=True))
+"""How far each leg is ahead of the front left one in its stride: the rear legs by a quarter stride."""
+PERIOD, STANCE, RATE = 1.0, 0.6, 100.0
+
+
+def contacts(legs=LEGS, start: float = 0.0, end: float = 12.0) -> list[LegReading]:
+    """Contacts of legs that walk evenly; the front left one strikes at whole seconds."""
+    return [
+        LegReading(round(index / RATE * 1e9), leg, ContactReading((index / RATE + OFFSETS[leg]) % PERIOD < STANCE))
+        for index in range(round(start * RATE), round(end * RATE))
+        for leg in legs
+    ]
+
+
+def between(readings: list[LegReading], start: float, end: float) -> list[LegReading]:
+    return [reading for reading in readings if start <= reading.stamp_ns / 1e9 < end]
+
+
+def test_four_legs_turn_two_wheels_half_a_step_apart():
+    """A quarter of a stride between the halves is half a step between the wheels."""
+    joints = [update.joints for update in follow(contacts()).updates if update.joints]
+    pitch = math.radians(30.0)
+    for sample in joints[-200:]:
+        phase = (sample.front.angle - sample.rear.angle) / pitch % 1.0
+        assert phase == pytest.approx(0.5, abs=0.04)
+        assert sample.front.rate == pytest.approx(2.0 * pitch, rel=0.2)
+
+
+def test_phases_are_two_pi_a_stride_and_zero_at_heel_strike():
+    last = follow(contacts()).updates[-1].phases
+    for leg, turn in last.legs.items():
+        expected = math.tau * ((last.stamp_ns / 1e9 + OFFSETS[leg]) % PERIOD)
+        assert turn.angle % math.tau == pytest.approx(expected, abs=math.tau * 0.015)
+        assert turn.rate == pytest.approx(math.tau, rel=0.1)
+
+
+def test_one_half_alone_is_told_and_the_other_left_open():
+    joints = [update.joints for update in follow(contacts((LEFT, RIGHT))).updates if update.joints]
+    assert all(math.isfinite(sample.front.angle) and math.isnan(sample.rear.angle) for sample in joints)
+
+
+def test_a_silent_sensor_leaves_a_gap_and_never_a_guess():
+    silent = [r for r in contacts() if not (r.leg == LEFT and 5.3 <= r.stamp_ns / 1e9 < 8.5)]
+    followed = follow(silent)
+    silence = LegParams().silence
+    for update in followed.updates:
+        seconds = update.phases.stamp_ns / 1e9 if update.phases else 0.0
+        if 5.3 + silence < seconds < 9.0:  # until it strikes again
+            assert LEFT not in update.phases.legs
+            assert RIGHT in update.phases.legs
+            assert math.isnan(update.joints.front.angle)
+            assert math.isfinite(update.joints.rear.angle)
+    assert followed.status.legs[LEFT].gaps == 1
+    assert LEFT in followed.updates[-1].phases.legs
+    assert math.isfinite(followed.updates[-1].joints.front.angle)
+
+
+def test_a_recording_that_starts_again_is_followed_again():
+    readings = contacts()
+    followed = follow([*readings, *readings])
+    assert followed.status.refused['reversed'] == 0
+    assert followed.updates[-1].phases.legs.keys() == set(LEGS)
+
+
+@pytest.mark.parametrize(
+    ('reading', 'why'),
+    [
+        (LegReading(3_000_000_000, LEFT, WrenchReading(math.nan)), 'not finite'),
+        (LegReading(3_000_000_000, LEFT, ImuReading((0.0, math.inf, 0.0), (0.0, 0.0, 9.8))), 'not finite'),
+        (LegReading(3_000_000_000, LEFT, HipReading(math.nan)), 'not finite'),
+        (LegReading(3_000_000_000, LEFT, WrenchReading(500.0)), 'another sensor'),
+        (LegReading(2_990_000_000, LEFT, ContactReading(True)), 'repeated'),
+        (LegReading(2_500_000_000, LEFT, ContactReading(True)), 'reversed'),
+        (LegReading(9_000_000_000, LEFT, ContactReading(True)), 'future'),
+    ],
+)
+def test_a_reading_that_cannot_be_is_refused_and_counted(reading, why):
+    tracker = LegTracker(LegParams())
+    for good in contacts(end=3.0):
+        tracker.update(good)
+    before = tracker.status()
+    assert tracker.update(reading, now_ns=3_100_000_000) is None
+    after = tracker.status()
+    assert after.refused == {**before.refused, why: 1}
+    assert after.legs == before.legs
+
+
+def test_another_sensor_takes_over_once_the_first_is_silent():
+    wrenches = [r._replace(reading=WrenchReading(700.0 * r.reading.touches)) for r in contacts(start=6.0)]
+    followed = follow([*contacts(end=5.0), *wrenches])
+    assert all(status.kind == 'wrench' for status in followed.status.legs.values())
+    assert followed.updates[-1].phases.legs.keys() == set(LEGS)
+
+
+def test_no_more_is_published_than_the_rate_allows_but_every_strike_is():
+    followed = follow(contacts(), LegParams(rate=10.0))
+    stamps = [update.phases.stamp_ns for update in followed.updates if update.phases]
+    strikes = {strike.known_ns for strike in followed.strikes}
+    assert len(stamps) <= 10 * 12 + len(strikes)
+    assert strikes <= {0, *stamps} | set(sorted(strikes)[:4])
