@@ -8,12 +8,13 @@ import pytest
 
 from tests import ROOT
 
-PACKAGES = ('dcdrw_msgs_py', 'dcdrw_sim', 'dcdrw_tracker', 'dcdrw')
+PACKAGES = ('dcdrw_msgs_py', 'dcdrw_sim', 'dcdrw_tracker', 'dcdrw_control', 'dcdrw')
 ALLOWED = {
     'dcdrw_msgs_py': set(),
     'dcdrw_sim': {'dcdrw_msgs_py'},
     'dcdrw_tracker': {'dcdrw_msgs_py'},
-    'dcdrw': {'dcdrw_msgs_py', 'dcdrw_sim', 'dcdrw_tracker'},
+    'dcdrw_control': {'dcdrw_msgs_py'},
+    'dcdrw': {'dcdrw_msgs_py', 'dcdrw_sim', 'dcdrw_tracker', 'dcdrw_control'},
 }
 KNOW_ROS = {
     'dcdrw_msgs_py.node',

@@ -16,7 +16,7 @@ from dcdrw import entry
 from dcdrw.suite.executables import EXECUTABLES
 from tests import ROOT
 
-PACKAGES = ('dcdrw_msgs_py', 'dcdrw_sim', 'dcdrw_tracker', 'dcdrw')
+PACKAGES = ('dcdrw_msgs_py', 'dcdrw_sim', 'dcdrw_tracker', 'dcdrw_control', 'dcdrw')
 COMMANDS = set(entry.EXECUTABLES)
 # Third-party modules and the package.xml key (rosdep) that brings each.
 KEYS = {
