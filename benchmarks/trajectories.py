@@ -37,8 +37,8 @@ from dcdrw_sim.model.presets import preset
 from dcdrw_sim.motion import pair as simulation
 from dcdrw_sim.motion import trajectory
 from dcdrw_sim.motion.compiled import AVAILABLE
+from dcdrw_sim.motion.ends import BACKWARD, End
 from dcdrw_sim.motion.ensemble import run_ensemble
-from dcdrw_sim.motion.strikes import BACKWARD, End
 
 SCIPY_TOLERANCE = 3e-13
 TAYLOR_TOLERANCE = 1e-13  # of the simulation and of the ensemble

@@ -22,7 +22,8 @@ from dcdrw_msgs_py.tagging import TagParams
 from dcdrw_sim.camera.render import LookParams, Renderer
 from dcdrw_sim.camera.scene import Footing, SceneParams, ViewParams
 from dcdrw_sim.model.presets import PRESETS
-from dcdrw_sim.motion.pair import Motion, MotionError, Simulation
+from dcdrw_sim.motion.ends import MotionError
+from dcdrw_sim.motion.pair import Motion, Simulation
 from dcdrw_sim.rig.simulator import SimulatorParams
 
 CODECS = {'.mp4': 'mp4v', '.avi': 'MJPG', '.mkv': 'FFV1'}

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from dcdrw_sim.map.return_map import PROGRESS, SINGULAR, TOLERANCE, Complexes, spectrum
 from dcdrw_sim.model.dynamics import kinetic_energy
+from dcdrw_sim.motion.ends import FORWARD, End
 from dcdrw_sim.motion.ensemble import Rigs, each, run_pairs, take
-from dcdrw_sim.motion.strikes import FORWARD, End
 
 Floats = NDArray[np.float64]
 

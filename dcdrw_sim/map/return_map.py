@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.map.variation import motion_derivative, rates
 from dcdrw_sim.model.dynamics import State, hub_distance
-from dcdrw_sim.model.start import start_state
-from dcdrw_sim.motion.pair import accept
-from dcdrw_sim.motion.strikes import FORWARD, End
+from dcdrw_sim.model.start import starts
+from dcdrw_sim.motion.ends import FORWARD, End, accept
 from dcdrw_sim.motion.trajectory import WHEELS, Run, run
 
 Floats = NDArray[np.float64]
@@ -188,11 +187,12 @@ class ReturnMap:
         """The section at a phase p in [0, 1), each wheel at the speed of its uncoupled limit cycle: θ2 = α2 (1 − 2 p).
 
         Raises:
-            ValueError: as `start_state`.
+            ValueError: as `starts`.
 
         """
-        after = start_state(self.rig, phase)
-        return SectionState(after.omega1 / math.cos(2.0 * self.rig.front.alpha), after.theta2, after.omega2)
+        if not 0.0 <= phase < 1.0:
+            raise ValueError(f'phase must be in [0, 1), got {phase}')
+        return SectionState(*starts(self.rig, phase)[1:].tolist())
 
     def phase(self, state: SectionState) -> Any:
         """The gait phase difference p at the section, in steps; the goal is 0.5."""

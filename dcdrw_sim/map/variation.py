@@ -16,9 +16,8 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from dcdrw_msgs_py.rig import RigParams
-from dcdrw_sim.model.dynamics import State, accelerations, coupler, coupler_force, stance_distance
+from dcdrw_sim.model.dynamics import State, accelerations, coupler, coupler_force, reset, stance_distance
 from dcdrw_sim.motion.pair import Segment
-from dcdrw_sim.motion.strikes import reset
 
 Floats = NDArray[np.float64]
 

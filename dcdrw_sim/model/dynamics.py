@@ -71,6 +71,14 @@ def accelerations(rig: RigParams, state: State, S: Any, external_force: Any = 0.
     )
 
 
+def reset(alpha: float, omega: float, direction: int) -> tuple[float, float]:
+    """Angle and speed after a strike: rules A and B of the paper, and their mirror for a wheel that rolls back.
+
+    Angular momentum about the new stance foot is kept, so the speed falls by cos 2α.
+    """
+    return -direction * alpha, omega * math.cos(2.0 * alpha)
+
+
 def tipping(rig: RigParams, i: int, state: State, steps: Sequence[int], external_force: float = 0.0) -> float:
     """Acceleration at which a wheel at rest on two spokes is pushed over one of them [rad/s²].
 

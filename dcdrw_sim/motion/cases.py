@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_sim.model.dynamics import State
+from dcdrw_sim.motion.ends import Strike
 from dcdrw_sim.motion.pair import Simulation
-from dcdrw_sim.motion.strikes import Strike
 from dcdrw_sim.motion.trajectory import Run
 
 DEFAULT_STRIKES = 20

@@ -6,7 +6,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dcdrw_sim.motion import strikes, taylor
+from dcdrw_sim.model import dynamics
+from dcdrw_sim.motion import ends, events, taylor
 
 Function = TypeVar('Function', bound=Callable[..., Any])
 
@@ -35,10 +36,10 @@ def compiled(function: Function) -> Function:
 
 
 if AVAILABLE:
-    from dcdrw_sim.motion import lanes as vectors
+    from dcdrw_sim.motion import lanes
 
     _FINGERPRINT = hashlib.sha256(
-        b''.join(Path(module.__file__ or '').read_bytes() for module in (strikes, taylor, vectors))
+        b''.join(Path(module.__file__ or '').read_bytes() for module in (dynamics, ends, events, taylor, lanes))
     ).hexdigest()[:16]
 
     for _function in (
@@ -48,8 +49,8 @@ if AVAILABLE:
         taylor.evaluate,
         taylor.expand,
         taylor.motion,
-        strikes.reset,
-        strikes.crossing,
-        strikes.first_strike,
+        dynamics.reset,
+        events.crossing,
+        events.first_strike,
     ):
         register_jitable(**_OPTIONS)(_function)

@@ -9,18 +9,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from dcdrw_msgs_py.quantity import fields, lookup
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelParams
-from dcdrw_sim.motion import strikes, taylor
+from dcdrw_sim.model.dynamics import reset
+from dcdrw_sim.motion import taylor
 from dcdrw_sim.motion.compiled import compiled
-from dcdrw_sim.motion.pair import (
+from dcdrw_sim.motion.ends import (
+    BACKWARD,
+    FORWARD,
     LEAVING_SPEED,
     LONGEST_STEP,
+    MIN_COUPLER_LENGTH,
+    NONE,
     SHORTEST_STEP,
+    STALL_TIME,
+    STANDING_SPEED,
     STIFFEST,
+    End,
     MotionError,
     accept,
-    work_parameters,
 )
-from dcdrw_sim.motion.strikes import BACKWARD, FORWARD, NONE, End, first_strike, reset
+from dcdrw_sim.motion.events import first_strike
 from dcdrw_sim.motion.taylor import (
     LANES,
     OMEGA1,
@@ -33,6 +40,7 @@ from dcdrw_sim.motion.taylor import (
     motion,
     rows,
     step_size,
+    work_parameters,
 )
 
 Floats = NDArray[np.float64]
@@ -380,7 +388,7 @@ def _strike(w: Any, l: int, i: int, direction: int) -> int:
     w[STEPS1 + row] += direction
     fallen = direction == BACKWARD and w[ROLLED1 + row] == BACKWARD
     w[LAST1 + row], w[ROLLED1 + row] = w[TIME + l], direction
-    stands = abs(w[omega]) < strikes.STANDING_SPEED * w[SPEED1 + row] and _rest(w, l, i)
+    stands = abs(w[omega]) < STANDING_SPEED * w[SPEED1 + row] and _rest(w, l, i)
     w[taylor.S + l] = _stance_distance(w, l)
     return FALLEN if fallen else STANDING if stands else NONE_YET
 
@@ -426,7 +434,7 @@ def _run(
             if w[PAIR + l] == NO_PAIR:
                 continue
             end, mine = NONE_YET, int(w[PAIR + l])
-            if not w[taylor.LENGTH + l] > strikes.MIN_COUPLER_LENGTH * w[taylor.L1 + l]:
+            if not w[taylor.LENGTH + l] > MIN_COUPLER_LENGTH * w[taylor.L1 + l]:
                 end = HUBS_MET
             elif not w[REACH + l] >= SHORTEST_STEP * w[UNIT + l]:
                 end = TOO_FAST
@@ -439,7 +447,7 @@ def _run(
                     end = STRIKES
             if end == NONE_YET and w[TIME + l] >= seconds:
                 end = TIME_OVER
-            if end == NONE_YET and w[TIME + l] - min(w[LAST1 + l], w[LAST2 + l]) > strikes.STALL_TIME * w[UNIT + l]:
+            if end == NONE_YET and w[TIME + l] - min(w[LAST1 + l], w[LAST2 + l]) > STALL_TIME * w[UNIT + l]:
                 end = STALLED
             if end != NONE_YET:
                 ends[mine], durations[mine], w[PAIR + l] = end, w[TIME + l], NO_PAIR

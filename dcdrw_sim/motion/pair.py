@@ -10,44 +10,32 @@ from numpy.typing import NDArray
 
 from dcdrw_msgs_py.quantity import check
 from dcdrw_msgs_py.rig import RigParams, WheelParams
-from dcdrw_sim.model.dynamics import State, coupler, coupler_force, hub_distance, stance_distance, tipping
+from dcdrw_sim.model.dynamics import State, coupler, coupler_force, hub_distance, reset, stance_distance, tipping
 from dcdrw_sim.motion import taylor
-from dcdrw_sim.motion.strikes import (
+from dcdrw_sim.motion.ends import (
+    LEAST_TIME,
+    LEAVING_SPEED,
+    LONGEST_STEP,
+    MANY_STEPS,
     MIN_COUPLER_LENGTH,
     NONE,
+    SHORTEST_STEP,
     STANDING_SPEED,
     End,
+    HubsMetError,
+    MotionError,
     Strike,
-    crossing,
-    first_strike,
-    reset,
+    accept,
 )
+from dcdrw_sim.motion.events import crossing, first_strike
 from dcdrw_sim.motion.taylor import LANES, ORDER
 
 TOLERANCE = 1e-16
 """Last term of the angles' series at the end of a step [rad]."""
-LONGEST_STEP = 1.0
-"""Longest step, in √(ℓ/g): a series whose last terms happen to vanish looks better than it is."""
-SHORTEST_STEP = 1e-9
-"""Shortest step that is followed, in √(ℓ/g)."""
-STIFFEST = 1e5
-"""Fastest rate of the coupler that is accepted, in √(g/ℓ): the steps are about the inverse of this rate."""
-LEAVING_SPEED = 1e-12
-"""Speed at which a standing wheel leaves, in √(g/ℓ), so that it never falls back at the same instant."""
-MANY_STEPS, LEAST_TIME = 100, 1e-6
-"""So many steps take at least this long, in √(ℓ/g): strikes and releases at one instant are few."""
 
 _THETA = (taylor.THETA1, taylor.THETA2)
 _OMEGA = (taylor.OMEGA1, taylor.OMEGA2)
 _FREE = (taylor.FREE1, taylor.FREE2)
-
-
-class MotionError(ValueError):
-    """The motion cannot be followed any further."""
-
-
-class HubsMetError(MotionError):
-    """The coupler has no length, and so no direction."""
 
 
 class Segment(NamedTuple):
@@ -104,30 +92,6 @@ class _Ahead(NamedTuple):
     state: State
 
 
-def work_parameters(w: taylor.Work, l: int, rig: RigParams, external_force: float = 0.0) -> None:
-    """Write a rig's parameters into lane l of a work array."""
-    front, rear = rig.front, rig.rear
-    for row, value in (
-        (taylor.G1, rig.gravity / front.length),
-        (taylor.G2, rig.gravity / rear.length),
-        (taylor.COS_SLOPE, math.cos(rig.slope)),
-        (taylor.SIN_SLOPE, math.sin(rig.slope)),
-        (taylor.L1, front.length),
-        (taylor.L2, rear.length),
-        (taylor.INV_ML1, 1.0 / (front.mass * front.length)),
-        (taylor.INV_ML2, 1.0 / (rear.mass * rear.length)),
-        (taylor.K, rig.k),
-        (taylor.B, rig.b),
-        (taylor.D0, rig.D0),
-        (taylor.FORCE, external_force),
-        (taylor.ALPHA1, front.alpha),
-        (taylor.ALPHA2, rear.alpha),
-        (taylor.FREE1, 1.0),
-        (taylor.FREE2, 1.0),
-    ):
-        w[row + l] = value
-
-
 class Simulation:
     """A pair of wheels in time: `step` from series to series, or `advance_to` times of one's own choice.
 
@@ -182,6 +146,7 @@ class Simulation:
 
     @rig.setter
     def rig(self, rig: RigParams) -> None:
+        rig = check(rig).resolved()  # its D0 goes by its own S0
         rig = accept(rig._replace(front=self._rig.front, rear=self._rig.rear, S0=self._rig.S0))
         if rig != self._rig:
             self._start_anew()
@@ -395,29 +360,10 @@ class Simulation:
         w[taylor.THETA1], w[taylor.OMEGA1], w[taylor.THETA2], w[taylor.OMEGA2] = map(float, state)
 
     def _write_parameters(self) -> None:
-        work_parameters(self._work, 0, self._rig, self._force)
+        taylor.work_parameters(self._work, 0, self._rig, self._force)
         self._work[taylor.S] = stance_distance(self._rig, *self.steps)
         for i in (0, 1):
             self._work[_FREE[i]] = 0.0 if self.standing[i] else 1.0
-
-
-def accept(rig: RigParams) -> RigParams:
-    """The rig with its derived defaults.
-
-    Raises:
-        ValueError: an impossible parameter, or a coupler too stiff to follow.
-
-    """
-    rig = check(rig).resolved()
-    fastest = STIFFEST * math.sqrt(rig.gravity / rig.front.length)
-    mass = 1.0 / (1.0 / rig.front.mass + 1.0 / rig.rear.mass)
-    for name, value, most in (('k', rig.k, mass * fastest**2), ('b', rig.b, mass * fastest)):
-        if value > most:
-            raise ValueError(
-                f'{name} must be ≤ {most:.3g} with these wheels, got {value:g}: a stiffer coupler is a '
-                'rod, whose motion takes too many steps to follow'
-            )
-    return rig
 
 
 def _coefficients(w: taylor.Work, series: int) -> NDArray[np.float64]:

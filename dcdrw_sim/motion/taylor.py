@@ -26,6 +26,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dcdrw_msgs_py.rig import RigParams
+
 Work = MutableSequence[float]
 
 LANES = 16
@@ -82,6 +84,30 @@ _TORQUES = ((SUM1, LEVER1, PULL), (SUM2, LEVER2, PULL))
 # Coefficients of sin x / x and cos x in powers of −x² as ratios of neighbours, highest first (Horner).
 _SIN = tuple(1.0 / ((2 * j) * (2 * j + 1)) for j in range(9, 0, -1))
 _COS = tuple(1.0 / ((2 * j - 1) * (2 * j)) for j in range(9, 0, -1))
+
+
+def work_parameters(w: Work, l: int, rig: RigParams, external_force: float = 0.0) -> None:
+    """Write a rig's parameters into lane l of a work array."""
+    front, rear = rig.front, rig.rear
+    for row, value in (
+        (G1, rig.gravity / front.length),
+        (G2, rig.gravity / rear.length),
+        (COS_SLOPE, math.cos(rig.slope)),
+        (SIN_SLOPE, math.sin(rig.slope)),
+        (L1, front.length),
+        (L2, rear.length),
+        (INV_ML1, 1.0 / (front.mass * front.length)),
+        (INV_ML2, 1.0 / (rear.mass * rear.length)),
+        (K, rig.k),
+        (B, rig.b),
+        (D0, rig.D0),
+        (FORCE, external_force),
+        (ALPHA1, front.alpha),
+        (ALPHA2, rear.alpha),
+        (FREE1, 1.0),
+        (FREE2, 1.0),
+    ):
+        w[row + l] = value
 
 
 def rows(w: Any, lanes: int) -> Any:

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
 from dcdrw_sim.model.dynamics import State, coupler, coupler_force, stance_distance
-from dcdrw_sim.motion.pair import HubsMetError, Segment, Simulation
-from dcdrw_sim.motion.strikes import BACKWARD, NONE, STALL_TIME, End, Strike
+from dcdrw_sim.motion.ends import BACKWARD, NONE, STALL_TIME, End, HubsMetError, Strike
+from dcdrw_sim.motion.pair import Segment, Simulation
 
 WHEELS = (FRONT, REAR)
 

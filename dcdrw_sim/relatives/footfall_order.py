@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
-from dcdrw_sim.motion.strikes import Strike
+from dcdrw_sim.motion.ends import Strike
 
 FEET = {1: 'front left', 2: 'front right', 3: 'rear left', 4: 'rear right'}
 _FRONT, _REAR = (1, 2), (4, 3)

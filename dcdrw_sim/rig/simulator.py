@@ -8,7 +8,7 @@ from dcdrw_msgs_py.quantity import Quantity
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.samples import CouplerSample, JointSample, Turn
 from dcdrw_sim.model.dynamics import State
-from dcdrw_sim.model.start import start_state
+from dcdrw_sim.model.start import Start, start
 from dcdrw_sim.motion.pair import Simulation
 
 FROM_PHASE = 'from initial_phase_percent'
@@ -52,23 +52,18 @@ class SimulatorParams(NamedTuple):
                 'use_sim_time: true in the other nodes: their clock must keep the same pace'
             )
 
-    def start(self, rig: RigParams) -> tuple[RigParams, State]:
-        """The rig and its state at the start: as given, and from the initial phase where not.
-
-        The phase start is just after a strike of the front wheel: the feet are then S0 + σ1 apart, as they are S0
-        apart just before it, where the spring is at rest at φ = α by the default of D0.
+    def start(self, rig: RigParams) -> Start:
+        """The start as given, and from the initial phase where not; where all is given, the feet are S0 apart.
 
         Raises:
             ValueError: the slope is too gentle for the speeds that the initial phase asks for.
 
         """
-        rig = rig.resolved()
         given = (self.theta1, self.omega1, self.theta2, self.omega2)
         if not any(map(math.isnan, given)):
-            return rig, State(*given)
-        derived = start_state(rig, self.initial_phase_percent / 100.0)
-        state = State(*(d if math.isnan(g) else g for g, d in zip(given, derived, strict=True)))
-        return rig._replace(S0=rig.S0 + rig.front.step_length), state
+            return Start(rig.resolved(), State(*given))
+        rig, derived = start(rig, self.initial_phase_percent / 100.0)
+        return Start(rig, State(*(d if math.isnan(g) else g for g, d in zip(given, derived, strict=True))))
 
 
 class SimulatedRig:
@@ -96,7 +91,7 @@ class SimulatedRig:
             ValueError: the rig is impossible.
 
         """
-        self.simulation.rig = rig.resolved()
+        self.simulation.rig = rig
         self._rig = rig
 
     def read(self, t: float, stamp_ns: int, held: bool = False) -> JointSample | None:

@@ -16,7 +16,7 @@ from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, 
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.topics import CLOCK, COUPLER_FORCE_COMMAND, JOINT_STATES
-from dcdrw_sim.motion.pair import MotionError, accept
+from dcdrw_sim.motion.ends import MotionError, accept
 from dcdrw_sim.rig.simulator import SimulatedRig, SimulatorParams, Timeline
 
 SHORTEST_TICK = 0.0005

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_sim.model.start import starts
 from dcdrw_sim.motion.ensemble import spread
-from dcdrw_sim.study.points import starts
 from dcdrw_sim.study.regimes import bisect, judge_starts
 from dcdrw_sim.study.verdict import Judgement, Verdict
 
@@ -36,7 +36,7 @@ def basin(rig: RigParams, phases: ArrayLike, speeds: ArrayLike, seconds: float) 
 
     Args:
         rig: the rig; derived defaults are filled in.
-        phases: in steps, shape (P,), as `dcdrw_sim.study.points.starts`.
+        phases: in steps, shape (P,), as `dcdrw_sim.model.start.starts`.
         speeds: of both wheels, as parts of those of their uncoupled limit cycles, shape (Q,).
         seconds: how long to simulate.
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.map.regression import PHASES
 from dcdrw_sim.model.dynamics import gentlest_slope
-from dcdrw_sim.model.start import start_state
+from dcdrw_sim.model.start import require_rolling
 from dcdrw_sim.motion.ensemble import Rigs, spread, take
 from dcdrw_sim.study.points import judge_points, run_starts, section_room, wheels_of
 from dcdrw_sim.study.verdict import Verdict, judge
@@ -189,7 +189,7 @@ def search(
     """
     if not (0.0 < k[0] <= k[1] and 0.0 < b[0] <= b[1]):
         raise ValueError(f'bounds must be 0 < least ≤ greatest, got {k} N/m and {b} N·s/m')
-    start_state(task.rig, 0.0)  # says why where no wheel rolls
+    require_rolling(task.rig)
     grid = score(task, *mesh(k, b), report=report)
     eased = score(task, grid.k, grid.b, np.full(GRID**2, (1.0 - EASE) * task.rig.slope), report)
 

@@ -6,14 +6,14 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_sim.map.limit_cycles import LimitCycles, find_limit_cycles, losses
 from dcdrw_sim.map.regression import PHASES, fit_affine, fit_raw
 from dcdrw_sim.map.return_map import Complexes, spectrum
 from dcdrw_sim.model.dynamics import limit_cycle_speed
-from dcdrw_sim.model.start import start_state
+from dcdrw_sim.model.start import require_rolling, starts
 from dcdrw_sim.motion.ensemble import Ensemble, Rigs, run_pairs, take
 from dcdrw_sim.study.verdict import BAND, Judgement, Sections, Verdict, judge
 
@@ -99,25 +99,8 @@ def _fastest(front: WheelParams, rear: WheelParams, slope: float, gravity: float
         float(limit_cycle_speed(wheel, slope, gravity, wheel.alpha)) / (2.0 * wheel.alpha) for wheel in (front, rear)
     ]
     if any(map(math.isnan, rates)):
-        start_state(RigParams(front, rear, slope=slope, gravity=gravity), 0.0)  # says why
+        require_rolling(RigParams(front, rear, slope=slope, gravity=gravity))
     return max(rates)
-
-
-def starts(rig: RigParams, phases: ArrayLike, speeds: ArrayLike = 1.0) -> Floats:
-    """Both wheels on their uncoupled limit cycles, the front one about to strike; shape (..., 4).
-
-    Args:
-        rig: the rig, on a slope on which its wheels roll by themselves.
-        phases: p in [0, 1), in steps: θ2 = α2 (1 − 2 p).
-        speeds: of both wheels, as parts of those of the limit cycles; broadcast against the phases.
-
-    """
-    front, rear = rig.front, rig.rear
-    part, speed = np.broadcast_arrays(np.asarray(phases, float), np.asarray(speeds, float))
-    theta2 = rear.alpha * (1.0 - 2.0 * part)
-    omega1 = limit_cycle_speed(front, rig.slope, rig.gravity) / math.cos(2.0 * front.alpha)
-    omega2 = limit_cycle_speed(rear, rig.slope, rig.gravity, theta2)
-    return np.stack([np.full_like(theta2, front.alpha), omega1 * speed, theta2, omega2 * speed], axis=-1)
 
 
 @lru_cache(maxsize=1024)

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dcdrw_sim.motion.compiled import compiled
+from dcdrw_sim.motion.ends import BACKWARD, FORWARD
 from dcdrw_sim.motion.ensemble import FALLEN, HUBS_MET, STALLED, STANDING, TOO_FAST, Ensemble, Rigs
-from dcdrw_sim.motion.strikes import BACKWARD, FORWARD
 
 Floats = NDArray[np.float64]
 

@@ -16,9 +16,11 @@ from dcdrw_sim.model.dynamics import (
     kinetic_energy,
     limit_cycle_speed,
     mechanical_energy,
+    reset,
     stance_distance,
     tipping,
 )
+from dcdrw_sim.motion.ends import BACKWARD, FORWARD
 from tests.sim.oracle import paper_rates
 from tests.sim.rigs import ALPHA, GENTLE, UNEQUAL, between, rigs, rolling, starts
 
@@ -122,6 +124,11 @@ def test_four_spokes_keep_no_speed_through_a_strike():
     square = WheelParams(spokes=4.0)
     assert gentlest_slope(square) == pytest.approx(square.alpha)
     assert math.isnan(limit_cycle_speed(square, math.radians(40), 9.81))
+
+
+def test_reset_mirrors():
+    assert reset(ALPHA, 1.5, FORWARD) == (-ALPHA, 1.5 * math.cos(2 * ALPHA))
+    assert reset(ALPHA, -1.5, BACKWARD) == (ALPHA, -1.5 * math.cos(2 * ALPHA))
 
 
 def at_rest(rig, i):

@@ -6,8 +6,8 @@ from dcdrw_msgs_py.quantity import check
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.model.presets import PRESETS, preset
 from dcdrw_sim.model.scaling import Scales, nondimensional
-from dcdrw_sim.model.start import start_state
-from dcdrw_sim.motion.strikes import End
+from dcdrw_sim.model.start import start
+from dcdrw_sim.motion.ends import End
 from dcdrw_sim.motion.trajectory import run
 
 
@@ -27,7 +27,7 @@ def test_the_sweep_has_no_dimensions():
 
 def test_the_sweep_comes_to_the_fixed_point_of_the_contract_s_table():
     rig = preset('paper-sweep')
-    result = run(rig, start_state(rig, 0.45), strikes=400)
+    result = run(*start(rig, 0.45), strikes=400)
     before = [strike.state.theta2 for strike in result.strikes if strike.wheel == 1]
     assert result.end is End.STRIKES
     assert math.degrees(before[-1]) == pytest.approx(-0.863, abs=5e-4)
@@ -37,7 +37,7 @@ def test_the_sweep_comes_to_the_fixed_point_of_the_contract_s_table():
 def test_every_preset_can_roll(name):
     rig = check(preset(name))
     assert PRESETS[name].doc
-    assert run(rig, start_state(rig, 0.4), strikes=4).end is End.STRIKES
+    assert run(*start(rig, 0.4), strikes=4).end is End.STRIKES
 
 
 def test_an_unknown_preset_is_answered_with_those_that_there_are():

@@ -5,7 +5,7 @@ import pytest
 
 from dcdrw_sim.model.dynamics import State
 from dcdrw_sim.motion.cases import DEFAULT_STRIKES, read_cases, run_record
-from dcdrw_sim.motion.strikes import End
+from dcdrw_sim.motion.ends import End
 from dcdrw_sim.motion.trajectory import run
 from tests import ROOT
 

@@ -12,9 +12,8 @@ from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_sim.model.dynamics import State, limit_cycle_speed
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.motion import trajectory
+from dcdrw_sim.motion.ends import BACKWARD, End, MotionError
 from dcdrw_sim.motion.ensemble import run_ensemble
-from dcdrw_sim.motion.pair import MotionError
-from dcdrw_sim.motion.strikes import BACKWARD, End
 from tests import ROOT
 from tests.sim.rigs import ALPHA, GENTLE, UNCOUPLED, UNEQUAL, between, rigs, rolling, starts
 

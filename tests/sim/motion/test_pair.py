@@ -11,15 +11,15 @@ from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_sim.model.dynamics import State, coupler, limit_cycle_speed, mechanical_energy, stance_distance
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.scaling import Scales, dimensional
-from dcdrw_sim.model.start import start_state
+from dcdrw_sim.model.start import start
 from dcdrw_sim.motion import pair as module
-from dcdrw_sim.motion.pair import HubsMetError, MotionError, Simulation
-from dcdrw_sim.motion.strikes import BACKWARD, FORWARD
+from dcdrw_sim.motion.ends import BACKWARD, FORWARD, HubsMetError, MotionError
+from dcdrw_sim.motion.pair import Simulation
 from tests.sim.oracle import integrate, paper_rates
 from tests.sim.rigs import ALPHA, GENTLE, UNCOUPLED, UNEQUAL, between, rigs, rolling, starts
 
 PAPER = preset('paper').resolved()
-START = start_state(PAPER, 0.216)
+START = start(PAPER, 0.216)
 few = settings(max_examples=20, deadline=None)
 
 
@@ -35,7 +35,8 @@ def strikes_of(rig, state, seconds, force=0.0):
 @pytest.mark.parametrize('rig', [PAPER, UNEQUAL.resolved(), PAPER._replace(b=5234.0), PAPER._replace(b=0.0, k=200.0)])
 def test_energy_changes_by_the_damper_s_loss_and_the_external_work_alone(rig):
     nodes, weights = np.polynomial.legendre.leggauss(16)
-    simulation = Simulation(rig, start_state(rig, 0.3))
+    simulation = Simulation(*start(rig, 0.3))
+    rig = simulation.rig
     scale = rig.front.mass * rig.gravity * rig.front.length
     for force in np.linspace(-10.0, 10.0, 40):
         simulation.external_force = force
@@ -82,23 +83,23 @@ def test_an_uncoupled_wheel_comes_to_its_limit_cycle_in_speed_and_period(spokes)
 
 
 @pytest.mark.parametrize(
-    ('rig', 'start'),
+    ('rig', 'state'),
     [
-        (UNEQUAL, start_state(UNEQUAL, 0.25)),
-        (UNEQUAL._replace(k=200.0, b=0.0, D0=0.9), start_state(UNEQUAL, 0.8)),
+        start(UNEQUAL, 0.25),
+        start(UNEQUAL._replace(k=200.0, b=0.0, D0=1.4), 0.8),
         (UNEQUAL._replace(S0=-0.9, D0=0.9), State(0.1, 1.5, -0.1, 1.3)),  # the rear wheel is ahead
-        (PAPER._replace(b=5234.0), START),
+        (START.rig._replace(b=5234.0), START.state),
     ],
 )
-def test_an_integration_of_the_paper_s_equations_by_other_means_agrees(rig, start):
-    expected, state = integrate(rig, start, 3.0)
-    simulation = Simulation(rig, start)
+def test_an_integration_of_the_paper_s_equations_by_other_means_agrees(rig, state):
+    expected, end = integrate(rig, state, 3.0)
+    simulation = Simulation(rig, state)
     got = simulation.advance_to(3.0).strikes
     assert [strike.wheel for strike in got] == [event.wheel for event in expected]
     for strike, event in zip(got, expected, strict=True):
         assert strike.t == pytest.approx(event.t, abs=1e-9)
         assert list(strike.state) == pytest.approx(event.state, abs=1e-9)
-    assert list(simulation.state) == pytest.approx(state, abs=1e-9)
+    assert list(simulation.state) == pytest.approx(end, abs=1e-9)
 
 
 # Symmetries
@@ -145,8 +146,8 @@ def test_seen_in_a_mirror_the_wheels_roll_backwards_down_the_mirrored_slope(rig,
 @few
 @given(between(0.0, 4.0))
 def test_the_motion_depends_on_its_state_not_on_the_time(shift):
-    whole = strikes_of(UNEQUAL, start_state(UNEQUAL, 0.25), 6.0)
-    simulation = Simulation(UNEQUAL, start_state(UNEQUAL, 0.25))
+    whole = strikes_of(*start(UNEQUAL, 0.25), 6.0)
+    simulation = Simulation(*start(UNEQUAL, 0.25))
     passed = len(simulation.advance_to(shift).strikes)
     again = simulation.rig._replace(S0=simulation.stance_distance)
     rest = strikes_of(again, simulation.state, 6.0 - shift)
@@ -173,14 +174,14 @@ def test_the_motion_scales(rig, start, scales):
 @few
 @given(st.lists(between(0.0, 5.0), min_size=1, max_size=30))
 def test_how_often_one_looks_does_not_change_what_happens(times):
-    watched, undisturbed = (Simulation(UNEQUAL, start_state(UNEQUAL, 0.25)) for _ in range(2))
+    watched, undisturbed = (Simulation(*start(UNEQUAL, 0.25)) for _ in range(2))
     seen = [strike for time in sorted(times) for strike in watched.advance_to(time).strikes]
     assert (*seen, *watched.advance_to(5.0).strikes) == undisturbed.advance_to(5.0).strikes
     assert watched.state == undisturbed.state
 
 
 def test_steps_and_samples_mix():
-    simulation, stepped = Simulation(PAPER, START), Simulation(PAPER, START)
+    simulation, stepped = Simulation(*START), Simulation(*START)
     segments = [stepped.step()[0] for _ in range(30)]
     for segment in segments:
         simulation.advance_to(0.5 * (segment.start + segment.end))
@@ -193,18 +194,18 @@ def test_samples_between_two_steps_cost_no_new_series(monkeypatch):
     expansions = []
     expand = module.taylor.expand
     monkeypatch.setattr(module.taylor, 'expand', lambda w, lanes: expansions.append(expand(w, lanes)))
-    simulation = Simulation(PAPER, START)
+    simulation = Simulation(*START)
     for j in range(2001):
         simulation.advance_to(0.001 * j)
         simulation.external_force, simulation.rig = 0.0, PAPER  # nothing new
     many = len(expansions)
     expansions.clear()
-    Simulation(PAPER, START).advance_to(2.0)
+    Simulation(*START).advance_to(2.0)
     assert many == len(expansions) < 60
 
 
 def test_a_sample_holds_what_sensors_would_read():
-    simulation = Simulation(UNEQUAL, start_state(UNEQUAL, 0.25))
+    simulation = Simulation(*start(UNEQUAL, 0.25))
     simulation.external_force = 3.0
     motion = simulation.advance_to(3.0)
     rig, state = simulation.rig, simulation.state
@@ -219,11 +220,11 @@ def test_a_sample_holds_what_sensors_would_read():
 
 
 def test_rotations_and_coupler_pass_a_strike_without_a_jump():
-    simulation = Simulation(PAPER, START)
+    simulation = Simulation(*START)
     while not (strike := simulation.step()[1]):
         pass
     after = simulation.advance_to(strike.t)
-    before = Simulation(PAPER, START).advance_to(strike.t - 1e-9)
+    before = Simulation(*START).advance_to(strike.t - 1e-9)
     assert after.strikes == ()  # told by `step` already
     assert after[1::2][:3] == pytest.approx(before[1::2][:3], abs=1e-8)
     assert after.omega2 == pytest.approx(before.omega2 * math.cos(2 * ALPHA), abs=1e-6)
@@ -231,7 +232,7 @@ def test_rotations_and_coupler_pass_a_strike_without_a_jump():
 
 @pytest.mark.parametrize('time', [0.9, -1.0, math.nan, math.inf])
 def test_time_only_goes_on(time):
-    simulation = Simulation(PAPER, START)
+    simulation = Simulation(*START)
     simulation.advance_to(1.0)
     with pytest.raises(ValueError, match=r'time must be finite and not before 1\.0 s'):
         simulation.advance_to(time)
@@ -242,7 +243,7 @@ def test_time_only_goes_on(time):
 
 @pytest.mark.parametrize('change', [{'k': 50.0}, {'b': 0.0}, {'D0': 0.5}, {'slope': 0.1}, {'gravity': 5.0}])
 def test_a_changed_parameter_holds_from_the_present_time_on(change):
-    simulation = Simulation(PAPER, START)
+    simulation = Simulation(*START)
     simulation.advance_to(0.43)
     steps, state = tuple(simulation.steps), simulation.state
     simulation.rig = PAPER._replace(**change)
@@ -257,31 +258,38 @@ def test_a_changed_parameter_holds_from_the_present_time_on(change):
 
 
 def test_the_external_force_adds_to_the_coupler_s():
-    simulation = Simulation(PAPER, START)
+    simulation = Simulation(*START)
     simulation.external_force = 2.0
-    shifted = Simulation(PAPER._replace(D0=PAPER.D0 - 2.0 / PAPER.k), START)
+    shifted = Simulation(START.rig._replace(D0=PAPER.D0 - 2.0 / PAPER.k), START.state)
     assert simulation.advance_to(1.5).rotation1 == pytest.approx(shifted.advance_to(1.5).rotation1, abs=1e-11)
 
 
 def test_wheels_and_places_of_the_feet_do_not_change_on_the_way():
-    simulation = Simulation(PAPER, START)
-    simulation.rig = UNEQUAL._replace(S0=7.0)
-    assert simulation.rig == UNEQUAL._replace(front=PAPER.front, rear=PAPER.rear, S0=PAPER.S0, D0=PAPER.D0)
+    simulation = Simulation(*START)
+    simulation.rig = UNEQUAL._replace(S0=7.0, D0=1.5)
+    kept = START.rig
+    assert simulation.rig == UNEQUAL._replace(front=kept.front, rear=kept.rear, S0=kept.S0, D0=1.5)
+
+
+def test_the_rest_length_derived_by_default_stays_as_it_was_at_the_start():
+    simulation = Simulation(*START)
+    simulation.rig = preset('paper')._replace(k=9.0)
+    assert simulation.rig == START.rig._replace(k=9.0)
 
 
 @pytest.mark.parametrize('force', [math.nan, math.inf])
 def test_a_force_that_is_none_is_refused(force):
-    simulation = Simulation(PAPER, START)
+    simulation = Simulation(*START)
     with pytest.raises(ValueError, match='external_force must be finite'):
         simulation.external_force = force
     assert simulation.external_force == 0.0
 
 
 def test_a_refused_rig_leaves_the_old_one():
-    simulation = Simulation(PAPER, START)
+    simulation = Simulation(*START)
     with pytest.raises(ValueError, match='k must be ≥ 0 N/m'):
         simulation.rig = PAPER._replace(k=-1.0)
-    assert simulation.rig == PAPER
+    assert simulation.rig == START.rig
 
 
 # Standing wheels
@@ -434,7 +442,7 @@ def test_a_leg_beyond_its_guard_is_refused_by_name(state, name):
 )
 def test_an_impossible_rig_is_refused_by_name(change, message):
     with pytest.raises(ValueError, match=message):
-        Simulation(PAPER._replace(**change), START)
+        Simulation(START.rig._replace(**change), START.state)
 
 
 def test_hubs_in_one_place_are_refused():
@@ -508,8 +516,7 @@ def test_whatever_happens_legs_stay_within_their_guards_and_time_goes_on(rig, sl
 
 
 def test_on_its_limit_cycle_a_pair_without_coupler_strikes_evenly():
-    start = start_state(UNCOUPLED, 0.5)
-    strikes = strikes_of(UNCOUPLED, start, 20.0)
+    strikes = strikes_of(*start(UNCOUPLED, 0.5), 20.0)
     for wheel, name in ((1, 'omega1'), (2, 'omega2')):
         mine = [strike for strike in strikes if strike.wheel == wheel]
         assert np.ptp(np.diff([strike.t for strike in mine])) < 1e-11
@@ -518,7 +525,7 @@ def test_on_its_limit_cycle_a_pair_without_coupler_strikes_evenly():
 
 
 def test_prepared_way_is_the_same_way():
-    plain, prepared = (Simulation(PAPER, START) for _ in range(2))
+    plain, prepared = (Simulation(*START) for _ in range(2))
     for k in range(1, 400):
         prepared.prepare(k / 100)
         assert prepared.advance_to(k / 100) == plain.advance_to(k / 100)

@@ -7,8 +7,7 @@ from scipy.integrate import solve_ivp
 
 from dcdrw_sim.model.dynamics import State, accelerations, coupler, coupler_force
 from dcdrw_sim.motion import taylor
-from dcdrw_sim.motion.pair import work_parameters
-from dcdrw_sim.motion.taylor import LANES, LENGTH, OMEGA1, OMEGA2, ORDER, PULL, THETA1, THETA2, S
+from dcdrw_sim.motion.taylor import LANES, LENGTH, OMEGA1, OMEGA2, ORDER, PULL, THETA1, THETA2, S, work_parameters
 from tests.sim.oracle import paper_rates
 from tests.sim.rigs import UNEQUAL, between, rigs, rolling, starts
 

@@ -5,14 +5,14 @@ import pytest
 
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.model.dynamics import State
-from dcdrw_sim.model.start import start_state
-from dcdrw_sim.motion.pair import MotionError, Simulation
-from dcdrw_sim.motion.strikes import STALL_TIME, End
+from dcdrw_sim.model.start import start
+from dcdrw_sim.motion.ends import STALL_TIME, End, MotionError
+from dcdrw_sim.motion.pair import Simulation
 from dcdrw_sim.motion.trajectory import run
 from tests.sim.rigs import ALPHA, GENTLE, UNCOUPLED, UNEQUAL
 
-START = start_state(UNEQUAL, 0.25)
-RUN = run(UNEQUAL, START, seconds=4.0)
+START = start(UNEQUAL, 0.25)
+RUN = run(*START, seconds=4.0)
 
 
 def test_segments_join_without_gaps_from_the_start_to_the_end():
@@ -22,7 +22,7 @@ def test_segments_join_without_gaps_from_the_start_to_the_end():
 
 
 def test_dense_output_is_the_motion_of_the_simulation():
-    simulation = Simulation(UNEQUAL, START)
+    simulation = Simulation(*START)
     times = np.linspace(0.0, 4.0, 173)
     trajectory = RUN.at(times)
     for j, time in enumerate(times):
@@ -67,19 +67,19 @@ def test_times_outside_the_run_are_refused(times):
 
 def test_a_run_ends_with_its_time_or_with_its_strikes():
     assert RUN.end is End.TIME
-    counted = run(UNEQUAL, START, strikes=5)
+    counted = run(*START, strikes=5)
     assert (counted.end, len(counted.strikes)) == (End.STRIKES, 5)
     assert counted.duration == counted.strikes[-1].t
     assert counted.strikes == RUN.strikes[:5]
-    assert run(UNEQUAL, START, seconds=4.0, strikes=5).end is End.STRIKES
-    assert run(UNEQUAL, START, seconds=0.01, strikes=5).end is End.TIME
+    assert run(*START, seconds=4.0, strikes=5).end is End.STRIKES
+    assert run(*START, seconds=0.01, strikes=5).end is End.TIME
     assert (RUN.wheel, RUN.reason) == (0, 'the time asked for is over')
 
 
 def test_a_run_of_no_time_holds_its_start():
-    empty = run(UNEQUAL, START, seconds=0.0)
+    empty = run(*START, seconds=0.0)
     assert (empty.end, empty.strikes, empty.duration) == (End.TIME, [], 0.0)
-    assert empty.at(0.0).theta2[0] == START.theta2
+    assert empty.at(0.0).theta2[0] == START.state.theta2
 
 
 def test_on_too_gentle_a_slope_a_wheel_ends_standing():
@@ -135,7 +135,7 @@ def test_hubs_that_meet_end_the_run_where_they_do():
 )
 def test_a_run_without_sensible_limit_is_refused(limits):
     with pytest.raises(ValueError, match='a run needs a limit, seconds ≥ 0 or strikes ≥ 1'):
-        run(UNEQUAL, START, **limits)
+        run(*START, **limits)
 
 
 def test_a_motion_too_fast_to_follow_is_refused():

@@ -2,8 +2,8 @@ import pytest
 from hypothesis import given, settings
 
 from dcdrw_sim.model.presets import preset
-from dcdrw_sim.model.start import start_state
-from dcdrw_sim.motion.strikes import FORWARD, Strike
+from dcdrw_sim.model.start import start
+from dcdrw_sim.motion.ends import FORWARD, Strike
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.relatives.footfall_order import FEET, Contact, contacts, order, rear_lead, steady_contacts
 from tests.sim.rigs import between
@@ -57,8 +57,7 @@ def test_one_front_and_one_rear_foot_are_always_on_the_ground(phase, time):
 
 
 def test_a_walk_of_the_coupled_pair_is_the_four_beat_walk():
-    rig = PAPER._replace(S0=PAPER.S0 + PAPER.front.step_length)  # just after a strike of the front wheel
-    result = run(rig, start_state(rig, 0.3), seconds=12.0)
+    result = run(*start(PAPER, 0.3), seconds=12.0)
     found = contacts(result.strikes, result.duration)
     assert order(found) == '1-4-2-3'
     assert len(found) == len(result.strikes)

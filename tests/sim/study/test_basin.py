@@ -8,11 +8,11 @@ import pytest
 from dcdrw_sim.model.dynamics import State
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.scaling import Scales, dimensional
-from dcdrw_sim.motion.strikes import BACKWARD
+from dcdrw_sim.model.start import starts
+from dcdrw_sim.motion.ends import BACKWARD
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.relatives.rimless_wheel import speed_to_pass
 from dcdrw_sim.study.basin import basin, judge_from, least_speeds
-from dcdrw_sim.study.points import starts
 from dcdrw_sim.study.verdict import Verdict
 
 RIG = preset('paper-sweep')

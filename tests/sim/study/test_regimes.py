@@ -10,12 +10,12 @@ from dcdrw_sim.map.return_map import ReturnMap
 from dcdrw_sim.model.dynamics import State, damper_power, gentlest_slope, mechanical_energy
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.scaling import dimensional, nondimensional
+from dcdrw_sim.model.start import starts
+from dcdrw_sim.motion.ends import BACKWARD
 from dcdrw_sim.motion.ensemble import spread
-from dcdrw_sim.motion.strikes import BACKWARD
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.relatives.even_gait import even_stall_band, gentlest_even_gait
 from dcdrw_sim.relatives.rigid_pair import gentlest_slope as rigid_gentlest_slope
-from dcdrw_sim.study.points import starts
 from dcdrw_sim.study.regimes import (
     bisect,
     folds,

@@ -13,8 +13,8 @@ from dcdrw_sim.map.return_map import ReturnMap
 from dcdrw_sim.model.dynamics import State, hub_distance
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.scaling import Scales, dimensional
+from dcdrw_sim.motion.ends import End
 from dcdrw_sim.motion.ensemble import STRIKE, TOO_FAST, Ensemble, run_ensemble, run_pairs, spread, take
-from dcdrw_sim.motion.strikes import End
 from dcdrw_sim.study.verdict import BAND, HOLD, Verdict, judge
 from tests.sim.rigs import ALPHA, GENTLE, UNCOUPLED, between
 

@@ -8,10 +8,10 @@ from scipy.integrate import solve_ivp
 from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_sim.model.dynamics import State, hub_distance, kinetic_energy, mechanical_energy, stance_distance
 from dcdrw_sim.model.presets import preset
-from dcdrw_sim.model.start import start_state
+from dcdrw_sim.model.start import start
 from dcdrw_sim.motion.cases import read_cases
+from dcdrw_sim.motion.ends import BACKWARD, FORWARD, End
 from dcdrw_sim.motion.pair import Simulation
-from dcdrw_sim.motion.strikes import BACKWARD, FORWARD, End, reset
 from dcdrw_sim.motion.trajectory import run
 from tests import ROOT
 from tests.sim.oracle import paper_rates
@@ -37,15 +37,15 @@ def test_every_strike_of_the_reference_to_1e_9(case, listed):
 
 
 @pytest.mark.parametrize(
-    ('rig', 'start'),
+    ('rig', 'state'),
     [
-        (preset('paper'), start_state(preset('paper'), 0.216)),
-        (UNEQUAL, start_state(UNEQUAL, 0.7)),
+        start(preset('paper'), 0.216),
+        start(UNEQUAL, 0.7),
         (GENTLE, State(-ALPHA, 0.3, 0.0, -0.2)),  # rocks
     ],
 )
-def test_a_strike_takes_sin2_of_2_alpha_of_that_wheel_and_nothing_else(rig, start):
-    simulation, struck = Simulation(rig, start), 0
+def test_a_strike_takes_sin2_of_2_alpha_of_that_wheel_and_nothing_else(rig, state):
+    simulation, struck = Simulation(rig, state), 0
     rig = simulation.rig
     while struck < 12:
         steps = tuple(simulation.steps)
@@ -68,14 +68,9 @@ def test_a_strike_takes_sin2_of_2_alpha_of_that_wheel_and_nothing_else(rig, star
 
 
 def test_the_struck_wheel_is_exactly_on_its_guard():
-    for strike in run(UNEQUAL, start_state(UNEQUAL, 0.3), strikes=10).strikes:
+    for strike in run(*start(UNEQUAL, 0.3), strikes=10).strikes:
         alpha = (UNEQUAL.front, UNEQUAL.rear)[strike.wheel - 1].alpha
         assert strike.state[2 * strike.wheel - 2] == alpha
-
-
-def test_reset_mirrors():
-    assert reset(ALPHA, 1.5, FORWARD) == (-ALPHA, 1.5 * math.cos(2 * ALPHA))
-    assert reset(ALPHA, -1.5, BACKWARD) == (ALPHA, -1.5 * math.cos(2 * ALPHA))
 
 
 def test_a_wheel_that_does_not_pass_its_apex_rocks_ever_faster_until_it_stands():

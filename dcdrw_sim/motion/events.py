@@ -1,67 +1,9 @@
-"""Strikes: where the next spoke meets the ground, what that does to the wheel, and how a run can end."""
+"""Events within a step: when a series passes a value, and when a wheel's next spoke meets the ground."""
 
 import math
-from enum import IntEnum
-from typing import NamedTuple
 
-from dcdrw_sim.model.dynamics import State
+from dcdrw_sim.motion.ends import BACKWARD, FORWARD, NONE
 from dcdrw_sim.motion.taylor import LANES, ORDER, Work, evaluate
-
-FORWARD, NONE, BACKWARD = 1, 0, -1
-
-
-class End(IntEnum):
-    """Why a run ended."""
-
-    TIME = 0
-    STRIKES = 1
-    STANDING = 2
-    FALLEN = 3
-    STALLED = 4
-    HUBS_MET = 5
-
-    @property
-    def meaning(self) -> str:
-        """The reason in words."""
-        return _MEANINGS[self]
-
-
-_MEANINGS = {
-    End.TIME: 'the time asked for is over',
-    End.STRIKES: 'as many strikes as asked for',
-    End.STANDING: 'a wheel did not pass its apex, rocked, and stands still on two spokes',
-    End.FALLEN: 'a wheel was pushed over: it passed its apex backwards and rolls uphill',
-    End.STALLED: 'a wheel hangs: no strike for longer than it could balance on its apex',
-    End.HUBS_MET: 'the hubs met: the coupler has no length and no direction left',
-}
-
-STANDING_SPEED = 1e-6
-"""A wheel that leaves a strike slower than this, in √(g/ℓ), and is pressed on both spokes, stands."""
-STALL_TIME = 50.0
-"""No strike for this long, in √(ℓ/g): from rounding error alone a wheel leaves its apex in about 36."""
-MIN_COUPLER_LENGTH = 1e-6
-"""Coupler length, in ℓ, at which the hubs count as met."""
-
-
-class Strike(NamedTuple):
-    """One strike, as the reference files hold it."""
-
-    wheel: int
-    """1 the front, 2 the rear."""
-    t: float
-    """[s]"""
-    state: State
-    """Just before."""
-    direction: int
-    """FORWARD, or BACKWARD where the wheel rocks or rolls uphill."""
-
-
-def reset(alpha: float, omega: float, direction: int) -> tuple[float, float]:
-    """Angle and speed after a strike: rules A and B of the paper, and their mirror for a wheel that rolls back.
-
-    Angular momentum about the new stance foot is kept, so the speed falls by cos 2α.
-    """
-    return -direction * alpha, omega * math.cos(2.0 * alpha)
 
 
 def crossing(w: Work, series: int, l: int, target: float, low: float, high: float) -> float:
