@@ -9,11 +9,13 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from difflib import get_close_matches
 from importlib import import_module
+from itertools import pairwise
 from typing import Any, Generic, TypeVar
 
 import rclpy
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.executors import ExternalShutdownException
@@ -43,8 +45,9 @@ OLD, FRESH = 0.25, 0.05
 class Parameters(Generic[Params]):
     """A parameter set declared on a node, and kept current: `value` is always a valid set.
 
-    What is not declared `live` is read-only. A live parameter that is set to something impossible is refused
-    with the reason, by its bounds or by `validate`, which raises ValueError; else `on_change` is told the new set.
+    What is not declared `live` keeps its value: only the same one is accepted, so that a node's own dump can be loaded
+    again. A live parameter that is set to something impossible is refused with the reason, by its bounds or by
+    `validate`, which raises ValueError; else `on_change` is told the new set.
 
     Raises:
         ValueError: an override (YAML or command line) is impossible.
@@ -67,6 +70,9 @@ class Parameters(Generic[Params]):
         self.value = build(params, values, f'parameter of {node.get_name()}')
         if validate:
             validate(self.value)
+        for name, field in self._fields.items():  # only now: rclpy's message on a start out of range names no mend
+            if limits := _range(field):
+                node.set_descriptor(name, _descriptor(field, **limits))
         node.add_on_set_parameters_callback(self._validate)
         node.add_post_set_parameters_callback(self._apply)
 
@@ -79,11 +85,19 @@ class Parameters(Generic[Params]):
     def _validate(self, parameters: list[Parameter]) -> Any:
         try:
             changed = self._changed(parameters)
-            if changed is not None and self._further:
-                self._further(changed)
+            if changed is not None:
+                self._require_fixed(changed)
+                if self._further:
+                    self._further(changed)
         except ValueError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
+
+    def _require_fixed(self, changed: Params) -> None:
+        before, after = flatten(self.value), flatten(changed)
+        for name, field in self._fields.items():
+            if not field.quantity.live and repr(after[name]) != repr(before[name]):  # a derived default is NaN
+                raise ValueError(f'{name} is fixed while the node runs (now {before[name]}); give it at the start')
 
     def _apply(self, parameters: list[Parameter]) -> None:
         changed = self._changed(parameters)
@@ -93,17 +107,28 @@ class Parameters(Generic[Params]):
                 self._on_change(changed)
 
 
-def _descriptor(field: Field) -> Any:
+def _descriptor(field: Field, **limits: Any) -> Any:
     quantity = field.quantity
     default = f'; default: {quantity.derived}' if quantity.derived else ''
     unit = f' [{quantity.unit}]' if quantity.unit else ''
     return ParameterDescriptor(
         name=field.name,
         description=f'{quantity.doc}{unit}{default}',
-        additional_constraints=quantity.bounds,
-        read_only=not quantity.live,
-        dynamic_typing=True,
-    )  # dynamic: a YAML integer does for a double
+        additional_constraints=', '.join(filter(None, (quantity.bounds, '' if quantity.live else 'fixed'))),
+        dynamic_typing=True,  # a YAML integer does for a double
+        **limits,
+    )
+
+
+def _range(field: Field) -> dict[str, Any]:
+    """The range that lets rqt show a slider, where a number has two bounds; a derived default, NaN, lies in none."""
+    quantity = field.quantity
+    low, high = max(quantity.low, quantity.above), quantity.high
+    if field.kind not in (int, float) or quantity.derived or not (math.isfinite(low) and math.isfinite(high)):
+        return {}
+    if field.kind is int:
+        return {'integer_range': [IntegerRange(from_value=int(low), to_value=int(high))]}
+    return {'floating_point_range': [FloatingPointRange(from_value=low, to_value=high)]}
 
 
 def message_type(topic: Topic) -> Any:
@@ -214,6 +239,17 @@ class Age:
         return time.monotonic() - self._at
 
 
+def _warn_of_unknown(node: Node, arguments: list[str]) -> None:
+    """Warn of parameters on the command line (-p NAME:=VALUE) that the node does not have."""
+    known = [parameter.name for parameter in node.get_parameters_by_prefix('').values()]
+    for flag, value in pairwise(arguments):
+        name = value.split(':=')[0].split(':')[-1]
+        if flag in ('-p', '--param') and ':=' in value and name not in known:
+            near = get_close_matches(name, known, n=1)
+            hint = f'did you mean {near[0]}?' if near else '`ros2 param list` names those that there are'
+            node.get_logger().warning(f'no parameter is named {name}, so it has no effect; {hint}')
+
+
 def run(name: str, make_node: Callable[[], Node], args: list[str] | None = None) -> int:
     """Run one node until SIGINT, SIGTERM or shutdown; returns the process's exit status.
 
@@ -238,6 +274,7 @@ def run(name: str, make_node: Callable[[], Node], args: list[str] | None = None)
         print(f'{name}: {error}', file=sys.stderr)
         rclpy.try_shutdown()
         return 2
+    _warn_of_unknown(node, sys.argv if args is None else args)
     executor = StreamExecutor()
     executor.add_node(node)
     gc.freeze()  # what exists now stays: collections that come need not look at it

@@ -75,8 +75,8 @@ class RigParams(NamedTuple):
 
     front: WheelParams = WheelParams()
     rear: WheelParams = WheelParams()
-    k: Annotated[float, Quantity('stiffness of the coupler', 'N/m', low=0.0, live=True)] = 5.25
-    b: Annotated[float, Quantity('damping of the coupler', 'N·s/m', low=0.0, live=True)] = 100.0
+    k: Annotated[float, Quantity('stiffness of the coupler', 'N/m', low=0.0, high=1e6, live=True)] = 5.25
+    b: Annotated[float, Quantity('damping of the coupler', 'N·s/m', low=0.0, high=1e6, live=True)] = 100.0
     D0: Annotated[
         float,
         Quantity('length of the coupler at rest', 'm', low=0.0, live=True, derived='S0 + ℓ sin α: at rest at φ = α'),

@@ -132,3 +132,8 @@ def test_bad_messages_are_survived(bench, node, topic, answer):
 
     bench.wait(answered, 'an answer to good messages')
     assert 'Traceback' not in bench.output(node.name)
+
+
+def test_a_misspelt_parameter_is_warned_of_with_the_right_name(bench):
+    bench.start('phase_estimator', hysteresis_degree=2.0)
+    bench.wait(lambda: 'did you mean hysteresis_deg?' in bench.output('phase_estimator'), 'the warning')
