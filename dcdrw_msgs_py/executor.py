@@ -10,6 +10,8 @@ from rclpy.subscription import Subscription
 from rclpy.utilities import timeout_sec_to_nsec
 from rclpy.waitable import NumberOfEntities
 
+from dcdrw_msgs_py.topics import CLOCK
+
 TURN_SECONDS = 0.01
 """How long one subscription is read at most before timers, services and the other subscriptions have their turn [s]."""
 
@@ -135,6 +137,8 @@ class StreamExecutor(Executor):
                 return
             if taken is None:
                 return
+            if subscription.topic_name == CLOCK.name and not subscription.raw and taken[0].clock.sec < 0:
+                continue  # rclpy's own subscription would raise
             if with_info:
                 subscription.callback(*taken)
             else:

@@ -12,10 +12,11 @@ from typing import Any
 
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from dcdrw.suite.processes import free_domain
-from dcdrw_msgs_py.node import advertise, listen
+from dcdrw_msgs_py.executor import StreamExecutor
+from dcdrw_msgs_py.node import advertise, message_type
 from dcdrw_msgs_py.topics import Topic
 
 PATIENCE = 20.0
@@ -34,7 +35,7 @@ class Bench:
         self.context = Context()
         rclpy.init(args=[], context=self.context, domain_id=self.domain)
         self.node = rclpy.create_node('bench', context=self.context)
-        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor = StreamExecutor(context=self.context)
         self.executor.add_node(self.node)
 
     def close(self) -> None:
@@ -74,7 +75,9 @@ class Bench:
         """Listen to a topic; the list fills as the bench spins."""
         name = name or topic.name
         messages: list[Any] = []
-        listen(self.node, topic._replace(name=name), messages.append)
+        durability = DurabilityPolicy.TRANSIENT_LOCAL if topic.latched else DurabilityPolicy.VOLATILE
+        qos = QoSProfile(depth=10_000, reliability=ReliabilityPolicy.RELIABLE, durability=durability)
+        self.node.create_subscription(message_type(topic), name, messages.append, qos)
         return messages
 
     def wake(self, publisher: Any, message: Callable[[int], Any], *answers: list[Any]) -> None:

@@ -27,6 +27,10 @@ BURST_SECONDS = 0.02
 """Time in one callback at most, so that services and signals are served however far behind the pace is."""
 CLOCK_RATE = 100.0
 """Messages on /clock per simulated second at most [Hz]."""
+CATCH_UP = 4.0
+"""After a pause of this process samples come at most so many times as fast, so that whoever listens keeps up."""
+CLOCK_JUMP = 10.0
+"""A clock that goes on by more than this from one tick to the next was set [s]; the wheels do not race after it."""
 CLOCK_START_NS = SECOND
 """Simulated time at the start: 0 means `no clock yet` in ROS."""
 
@@ -67,6 +71,18 @@ class SimulatorNode(Node):
         pace = params.rate * params.real_time_factor
         return max(1.0 / pace, SHORTEST_TICK) if pace else SHORTEST_TICK
 
+    def _burst(self) -> int:
+        """Samples at most in one tick."""
+        params = self._settings.value
+        pace = params.rate * params.real_time_factor
+        return math.ceil(CATCH_UP * pace * self._period()) if pace else sys.maxsize
+
+    def _follow(self, now: float) -> None:
+        """Go on with the motion at another time of the clock."""
+        self._timeline.restart_clock(now)
+        if not self._clock_publisher:
+            self._epoch_ns = round((now - self._timeline.due) * SECOND)
+
     def _restart(self) -> None:
         params = self._settings.value
         self._last_now = self._now()
@@ -78,8 +94,8 @@ class SimulatorNode(Node):
 
     def _tick(self) -> None:
         now = self._now()
-        if now < self._last_now:  # the clock that this node follows was set back
-            self._restart()
+        if not 0.0 <= now - self._last_now <= CLOCK_JUMP:  # the clock that this node follows was set, or begins
+            self._follow(now)
         self._last_now = now
         if self._failure or (self._paused and self._clock_publisher):  # simulated time stands still
             self._timeline.restart_clock(now)
@@ -89,7 +105,9 @@ class SimulatorNode(Node):
             self._rig.simulation.external_force = 0.0
         reached = self._timeline.reached(now)
         end = time.monotonic() + BURST_SECONDS
-        while self._timeline.due <= reached and not self._failure and time.monotonic() < end:
+        for _ in range(self._burst()):
+            if self._timeline.due > reached or self._failure or time.monotonic() >= end:
+                break
             self._publish()
         if not self._paused and self._period() <= PREPARE_WITHIN:
             with suppress(MotionError):  # told when the sample is due

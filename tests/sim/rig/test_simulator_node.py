@@ -2,15 +2,17 @@
 
 import itertools
 import math
+import signal
 
 import numpy as np
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
 
-from dcdrw_msgs_py.messages import SECOND, JointSampleReader, stamp_ns
+from dcdrw_msgs_py.messages import SECOND, JointSampleReader, stamp_ns, to_stamp
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.topics import CLOCK, COUPLER_FORCE_COMMAND, JOINT_STATES
 from dcdrw_sim.motion.trajectory import run
@@ -181,3 +183,47 @@ def test_impossible_parameters_end_it_with_one_line(bench, parameters, message):
     assert process.wait(20) == 2
     assert message in bench.output('simulator')
     assert 'Traceback' not in bench.output('simulator')
+
+
+def test_it_follows_a_clock_that_begins_anywhere_jumps_and_goes_back(bench):
+    """The motion goes on at its own pace, and the stamps are the clock's."""
+    clock, heard = bench.publisher(CLOCK, readers=0), bench.hear(JOINT_STATES)
+    process = bench.start('simulator', use_sim_time=True, rate=100)
+    bench.wait(clock.get_subscription_count, 'the simulator')
+    rotations = []
+    for start in (1.8e9, 10_000.0, -5.0, 20_000.0, 0.0):
+        for tick in range(100):
+            clock.publish(Clock(clock=to_stamp(round((start + 0.01 * tick) * SECOND))))
+            bench.spin(0.01)
+        if start >= 0.0:
+            last = samples(heard)[-1]
+            assert start <= last.stamp_ns / SECOND <= start + 1.0
+            rotations.append(last.front.angle)
+    assert process.poll() is None
+    assert all(0.0 < later - earlier < 2.0 for earlier, later in itertools.pairwise(rotations))
+
+
+def test_it_goes_on_when_use_sim_time_is_switched(bench):
+    process, heard = start_held(bench)
+    for value in (True, False):
+        request = SetParameters.Request(
+            parameters=[
+                Parameter(
+                    name='use_sim_time', value=ParameterValue(type=ParameterType.PARAMETER_BOOL, bool_value=value)
+                )
+            ]
+        )
+        assert bench.call(SetParameters, '/simulator/set_parameters', request).results[0].successful
+    count = len(heard)
+    bench.wait(lambda: len(heard) > count + 20, 'samples by the system clock again')
+    assert process.poll() is None
+
+
+def test_after_a_pause_of_its_process_every_sample_comes(bench):
+    process, heard = start_held(bench)
+    process.send_signal(signal.SIGSTOP)
+    bench.spin(2.0)
+    process.send_signal(signal.SIGCONT)
+    count = len(heard)
+    bench.wait(lambda: len(heard) > count + 300, 'what was missed, and more')
+    assert {b.stamp_ns - a.stamp_ns for a, b in itertools.pairwise(samples(heard))} == {STEP_NS}
