@@ -38,6 +38,8 @@ CLOCK_START_NS = SECOND
 class SimulatorNode(Node):
     """Publishes what a `SimulatedRig` does, at the pace of the node's clock, or of its own /clock."""
 
+    _timeline: Timeline
+
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('simulator', **kwargs)
         self._rig_parameters = Parameters(self, RigParams, lambda rig: self._rig.configure(rig), accept)
