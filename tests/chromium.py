@@ -14,7 +14,8 @@ from typing import Any
 import aiohttp
 import pytest
 
-PATIENCE = 30.0
+PATIENCE = 60.0
+"""Limit of every wait [s]: nodes and browser start slowly on a busy machine."""
 NAMES = ('chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable')
 
 

@@ -149,7 +149,10 @@ class PageServer:
         if len(self._browsers) >= _BROWSERS:
             raise web.HTTPServiceUnavailable(text=f'{_BROWSERS} browsers watch already.')
         browser = web.WebSocketResponse(heartbeat=5.0, max_msg_size=512, compress=False)
-        await browser.prepare(request)
+        try:
+            await browser.prepare(request)
+        except ConnectionError:  # it has left during the handshake: nobody to answer
+            return web.Response()
         self._browsers.add(browser)
         feed = asyncio.create_task(self._feed(browser))
         try:
@@ -159,7 +162,8 @@ class PageServer:
                         self._on_command(message.data)
                     except ValueError as error:
                         notice = {'text': str(error), 'ok': False}
-                        await browser.send_str(json.dumps([{'notices': [notice]}]))
+                        with suppress(ConnectionError):
+                            await browser.send_str(json.dumps([{'notices': [notice]}]))
         finally:
             self._browsers.discard(browser)
             feed.cancel()

@@ -3,6 +3,7 @@
 import asyncio
 import os
 import socket
+import struct
 import subprocess
 import sys
 from collections.abc import Awaitable, Callable, Iterator
@@ -215,6 +216,20 @@ def test_wrong_command_is_answered_and_a_right_one_handed_on(served):
 
     browse(visit)
     assert served.commands[0][:] == ('set', 'k', 3.0)
+
+
+def test_browsers_that_leave_at_once_are_no_error(served, caplog):
+    request = (
+        f'GET /ws HTTP/1.1\r\nHost: 127.0.0.1:{served.port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n'
+        'Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n'
+    ).encode()
+    wrong = b'\x81\x81\0\0\0\0{'  # a masked frame of text that is no command
+    for i in range(200):
+        with socket.create_connection(('127.0.0.1', served.port)) as browser:
+            browser.sendall(request + i % 2 * wrong)
+            browser.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack('ii', 1, 0))  # a reset, no farewell
+    assert handshake(f'{served.address}/ws') == 101
+    assert caplog.records == []
 
 
 @pytest.mark.parametrize(
