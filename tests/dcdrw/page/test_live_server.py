@@ -83,16 +83,18 @@ def handshake(address: str, **headers: str) -> int:
 
 
 def test_page_is_whole_and_asks_nothing_of_other_machines(served):
+    names = {file.name for file in PAGE.iterdir() if file.suffix in ('.html', '.css', '.js')}
+
     async def visit(client: ClientSession) -> list[tuple[str, str, Any]]:
         pages = []
-        for path in ('/', *(f'/{file.name}' for file in PAGE.iterdir() if file.name != 'index.html')):
+        for path in ('/', *(f'/{name}' for name in names - {'index.html'})):
             async with client.get(served.address + path) as answer:
                 assert answer.status == 200, path
                 pages.append((path, await answer.text(), answer.headers))
         return pages
 
     pages = browse(visit)
-    assert len(pages) == len(list(PAGE.iterdir()))
+    assert len(pages) == len(names) > 1
     for path, text, headers in pages:
         assert 'https://' not in text, path
         assert "default-src 'none'" in headers['Content-Security-Policy']
