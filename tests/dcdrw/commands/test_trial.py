@@ -15,6 +15,7 @@ import pytest
 
 from dcdrw.cli import main
 from tests import ROOT
+from tests.children import nodes, runs
 
 pytestmark = pytest.mark.processes
 
@@ -44,12 +45,6 @@ def wait_for_motion(process: subprocess.Popen[str]) -> None:
         if 'strikes' in line and 'strikes 0 + 0' not in line:
             return
     raise AssertionError(process.communicate()[1])
-
-
-def find(process: subprocess.Popen[str], module: str) -> list[int]:
-    """The children of a trial that run a module."""
-    children = Path(f'/proc/{process.pid}/task/{process.pid}/children').read_text().split()
-    return [int(child) for child in children if module in Path(f'/proc/{child}/cmdline').read_text()]
 
 
 def summary(tmp_path: Path) -> dict:
@@ -96,7 +91,7 @@ def test_interrupt_keeps_what_there_is(tmp_path):
 def test_dead_node_ends_the_trial_with_the_reason(tmp_path):
     process = start(tmp_path, '--seconds', '600')
     wait_for_motion(process)
-    (node,) = find(process, 'phase_estimator_node')
+    (node,) = nodes(process.pid, 'phase_estimator')
     os.kill(node, signal.SIGKILL)
     _, errors = process.communicate(timeout=40)
     assert process.returncode == 1
@@ -108,7 +103,7 @@ def test_dead_node_ends_the_trial_with_the_reason(tmp_path):
 def test_full_disk_ends_the_trial_and_keeps_what_is_there(tmp_path):
     process = start(tmp_path, '--seconds', '600')
     wait_for_motion(process)
-    (node,) = find(process, 'recorder_node')
+    (node,) = nodes(process.pid, 'recorder')
     size = (tmp_path / 'out' / 'recording' / 'recording_0.mcap').stat().st_size
     resource.prlimit(node, resource.RLIMIT_FSIZE, (size + 100, size + 100))
     _, errors = process.communicate(timeout=40)
@@ -121,7 +116,7 @@ def test_full_disk_ends_the_trial_and_keeps_what_is_there(tmp_path):
 def test_silence_ends_the_trial_with_the_reason(tmp_path):
     process = start(tmp_path, '--seconds', '600')
     wait_for_motion(process)
-    (node,) = find(process, 'simulator_node')
+    (node,) = nodes(process.pid, 'simulator')
     os.kill(node, signal.SIGSTOP)
     _, errors = process.communicate(timeout=40)
     assert process.returncode == 1
@@ -132,15 +127,12 @@ def test_silence_ends_the_trial_with_the_reason(tmp_path):
 def test_nodes_end_with_a_trial_that_is_killed(tmp_path):
     process = start(tmp_path, '--seconds', '600')
     wait_for_motion(process)
-    nodes = find(process, '_node')
-    assert len(nodes) == 4
+    started = nodes(process.pid)
+    assert len(started) == 4
     process.kill()
     process.communicate()
     end = time.monotonic() + 10
-    while any(
-        Path(f'/proc/{node}').exists() and 'Z' not in Path(f'/proc/{node}/stat').read_text().split()[2]
-        for node in nodes
-    ):
+    while any(map(runs, started)):
         assert time.monotonic() < end, 'orphans live on'
         time.sleep(0.05)
 

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -20,6 +19,7 @@ from dcdrw_msgs_py.topics import JOINT_STATES, PHASE_STATE
 from dcdrw_msgs_py.topics import SYNCHRONIZED as VERDICT
 from tests import ROOT
 from tests.bench import PATIENCE, Bench
+from tests.children import nodes, runs
 from tests.chromium import Chromium, Tab
 
 pytestmark = pytest.mark.processes
@@ -252,22 +252,9 @@ def test_trial_starts_the_nodes_and_lets_the_wheels_go(chromium):
         tab.wait("Number(document.getElementById('errors-canvas').dataset.steps) > 0")
         tab.wait("document.querySelectorAll('#nodes .name').length === 4")
         assert tab.complaints == []
-        nodes = [pid for pid in children(live._processes[-1].pid) if '_node' in command(pid)]
-        assert len(nodes) == 4
+        started = nodes(live._processes[-1].pid)
+        assert len(started) == 4
         assert live.end() == 0
-        assert not [pid for pid in nodes if command(pid)]
+        assert not any(map(runs, started))
     finally:
         live.close()
-
-
-def children(pid: int) -> list[int]:
-    found = [Path(f'/proc/{pid}/task/{task}/children').read_text() for task in os.listdir(f'/proc/{pid}/task')]
-    return [int(child) for child in ' '.join(found).split()]
-
-
-def command(pid: int) -> str:
-    """The command line of a process; empty where it has ended."""
-    try:
-        return Path(f'/proc/{pid}/cmdline').read_text()
-    except FileNotFoundError:
-        return ''
