@@ -54,6 +54,8 @@ class Return(NamedTuple):
     """After the step."""
     derivative: Floats
     """Of that state by the one before, shape (3, 3)."""
+    by_force: Floats
+    """Of that state by a constant external force, shape (3,) [per N]."""
     period: float
     """How long the step took [s]."""
 
@@ -64,6 +66,8 @@ class FixedPoint(NamedTuple):
     state: SectionState
     derivative: Floats
     """Of the map, shape (3, 3)."""
+    by_force: Floats
+    """How the state at the next section changes with a constant external force, shape (3,) [per N]."""
     period: float
     """A step's time [s]."""
     iterations: int
@@ -90,14 +94,15 @@ class ReturnMap:
 
     Args:
         rig: the rig; derived defaults are filled in.
+        external_force: a constant force that adds to the coupler's [N], positive in tension.
 
     Raises:
         ValueError: impossible parameters, or wheels that step differently far, so that S never comes back.
 
     """
 
-    def __init__(self, rig: RigParams) -> None:
-        self.rig = accept(rig)
+    def __init__(self, rig: RigParams, external_force: float = 0.0) -> None:
+        self.rig, self._force = accept(rig), external_force
         sigma1, sigma2 = self.rig.front.step_length, self.rig.rear.step_length
         if abs(sigma1 - sigma2) > 1e-9 * sigma1:
             raise ValueError(
@@ -126,10 +131,10 @@ class ReturnMap:
         """
         result = self._run(state)
         last = result.segments[-1]
-        flow = rates(self.rig, result.strikes[-1].state, self.rig.S0)
-        at_time = motion_derivative(self.rig, result.segments)
+        flow = rates(self.rig, result.strikes[-1].state, self.rig.S0, self._force)
+        at_time = motion_derivative(self.rig, result.segments, self._force)
         on_section = at_time - np.outer(flow / flow[0], at_time[0])  # the deviation where θ1 is α1 again
-        return Return(_section_of(result), on_section[1:, 1:], last.end)
+        return Return(_section_of(result), on_section[1:4, 1:4], on_section[1:4, 4], last.end)
 
     def iterate(self, start: SectionState, steps: int) -> Floats:
         """The states from a start on, each a row [θ1′, θ2, θ2′], shape (steps + 1, 3).
@@ -163,7 +168,7 @@ class ReturnMap:
         there = self.linearize(here)
         for iteration in range(limit):
             if self._distance(here, there.state) < TOLERANCE:
-                return FixedPoint(here, there.derivative, there.period, iteration)
+                return FixedPoint(here, there.derivative, there.by_force, there.period, iteration)
             here, there = self._newton(here, there) or (there.state, self.linearize(there.state))
         raise ValueError(
             f'no fixed point was found in {limit} iterations; the last state, {_text(here)}, still changes '
@@ -210,7 +215,7 @@ class ReturnMap:
         """The motion through a strike of the front wheel, one of the rear, and up to the next of the front."""
         if not state.omega1 > 0.0:
             raise ValueError(f'omega1 at the section must be > 0, got {state.omega1}')
-        result = run(self.rig, State(self.rig.front.alpha, *state), strikes=3)
+        result = run(self.rig, State(self.rig.front.alpha, *state), strikes=3, external_force=self._force)
         if trouble := _trouble(result):
             raise NoReturnError(f'the step from {_text(state)} does not come back to the section: {trouble}')
         return result

@@ -1,7 +1,7 @@
 """How small deviations grow along a motion: the variational equation between strikes, and its jumps at them.
 
-A deviation x of the state [θ1, ω1, θ2, ω2] follows x' = J x, J the Jacobian of the paper's (1) and (2) along the
-motion. At a strike it jumps by the saltation matrix, because a deviation also moves the strike's time (Leine and
+A deviation x of [θ1, ω1, θ2, ω2, F], the state and a constant external force in the coupler, follows x' = J x, J the
+Jacobian of the paper's (1) and (2) along the motion; that of F stays. At a strike it jumps by the saltation matrix, because a deviation also moves the strike's time (Leine and
 Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004).
 """
 
@@ -31,43 +31,45 @@ _INTEGRALS = 0.5 * legendre.legval(_NODES, legendre.legint(_LAGRANGE, lbnd=-1)).
 """[i, j]: what a value at point j of the unit interval adds to the integral up to point i."""
 
 
-def rates(rig: RigParams, state: State, S: float) -> Floats:
-    """Rates of [θ1, ω1, θ2, ω2], shape (4,)."""
-    acceleration1, acceleration2 = accelerations(rig, state, S)
-    return np.array([state.omega1, acceleration1, state.omega2, acceleration2])
+def rates(rig: RigParams, state: State, S: float, external_force: float = 0.0) -> Floats:
+    """Rates of [θ1, ω1, θ2, ω2, F], shape (5,)."""
+    acceleration1, acceleration2 = accelerations(rig, state, S, external_force)
+    return np.array([state.omega1, acceleration1, state.omega2, acceleration2, 0.0])
 
 
-def jacobian(rig: RigParams, state: State, S: Any) -> Floats:
-    """Derivatives of the rates by the state, shape (..., 4, 4), at states and stance distances of shape (...)."""
+def jacobian(rig: RigParams, state: State, S: Any, external_force: float = 0.0) -> Floats:
+    """Derivatives of the rates by state and force, shape (..., 5, 5), at states and stance distances of shape (...)."""
     (l1, m1, _), (l2, m2, _) = rig.front, rig.rear
     theta1, omega1, theta2, omega2 = np.broadcast_arrays(*state)
     length, rate, p1, p2 = coupler(rig, State(theta1, omega1, theta2, omega2), S)
     cos_difference, zero, one = np.cos(theta1 - theta2), np.zeros(theta1.shape), np.ones(theta1.shape)
-    pull = coupler_force(rig, length, rate) / length
+    pull = (coupler_force(rig, length, rate) + external_force) / length
 
-    # Gradients by [θ1, ω1, θ2, ω2]: of p1, p2, D, of D Ḋ = ℓ1 p1 ω1 − ℓ2 p2 ω2, and of F/D.
-    by_p1 = np.array([l2 * cos_difference - S * np.sin(theta1), zero, -l2 * cos_difference, zero])
-    by_p2 = np.array([l1 * cos_difference, zero, -l1 * cos_difference - S * np.sin(theta2), zero])
-    by_length = np.array([l1 * p1, zero, -l2 * p2, zero]) / length
-    by_product = l1 * omega1 * by_p1 - l2 * omega2 * by_p2 + np.array([zero, l1 * p1, zero, -l2 * p2])
+    # Gradients by [θ1, ω1, θ2, ω2, F]: of p1, p2, D, of D Ḋ = ℓ1 p1 ω1 − ℓ2 p2 ω2, and of F/D.
+    by_p1 = np.array([l2 * cos_difference - S * np.sin(theta1), zero, -l2 * cos_difference, zero, zero])
+    by_p2 = np.array([l1 * cos_difference, zero, -l1 * cos_difference - S * np.sin(theta2), zero, zero])
+    by_length = np.array([l1 * p1, zero, -l2 * p2, zero, zero]) / length
+    by_product = l1 * omega1 * by_p1 - l2 * omega2 * by_p2 + np.array([zero, l1 * p1, zero, -l2 * p2, zero])
     by_rate = (by_product - rate * by_length) / length
-    by_pull = (coupler_force(rig._replace(D0=0.0), by_length, by_rate) - pull * by_length) / length
+    by_force = coupler_force(rig._replace(D0=0.0), by_length, by_rate) + np.array([zero, zero, zero, zero, one])
+    by_pull = (by_force - pull * by_length) / length
 
     weight1 = rig.gravity / l1 * np.cos(theta1 + rig.slope)
     weight2 = rig.gravity / l2 * np.cos(theta2 + rig.slope)
     rows = np.array(
         [
-            [zero, one, zero, zero],
-            np.array([weight1, zero, zero, zero]) - (pull * by_p1 + p1 * by_pull) / (m1 * l1),
-            [zero, zero, zero, one],
-            np.array([zero, zero, weight2, zero]) + (pull * by_p2 + p2 * by_pull) / (m2 * l2),
+            [zero, one, zero, zero, zero],
+            np.array([weight1, zero, zero, zero, zero]) - (pull * by_p1 + p1 * by_pull) / (m1 * l1),
+            [zero, zero, zero, one, zero],
+            np.array([zero, zero, weight2, zero, zero]) + (pull * by_p2 + p2 * by_pull) / (m2 * l2),
+            [zero, zero, zero, zero, zero],
         ]
     )
     return np.moveaxis(rows, (0, 1), (-2, -1))
 
 
-def propagators(rig: RigParams, segments: Sequence[Segment]) -> Floats:
-    """What each of N segments does to a deviation, shape (N, 4, 4).
+def propagators(rig: RigParams, segments: Sequence[Segment], external_force: float = 0.0) -> Floats:
+    """What each of N segments does to a deviation, shape (N, 5, 5).
 
     By collocation at Gauss points c_i, where all is known of the motion: X_i = 1 + h Σ_j a_ij J_j X_j, solved for
     all points of a segment at once.
@@ -77,24 +79,24 @@ def propagators(rig: RigParams, segments: Sequence[Segment]) -> Floats:
         [segment.at(segment.start + duration * _PARTS) for segment, duration in zip(segments, durations, strict=True)]
     )
     S = np.array([[stance_distance(rig, *segment.steps)] for segment in segments])
-    growth = durations[:, None, None, None] * jacobian(rig, State(*np.moveaxis(states, 1, 0)), S)
-    size = 4 * STAGES
+    growth = durations[:, None, None, None] * jacobian(rig, State(*np.moveaxis(states, 1, 0)), S, external_force)
+    size = 5 * STAGES
     system = np.eye(size) - np.einsum('ij,njab->niajb', _INTEGRALS, growth).reshape(-1, size, size)
-    start = np.tile(np.eye(4), (1, STAGES, 1))  # with all three axes: numpy 1 takes two for a row of vectors
+    start = np.tile(np.eye(5), (1, STAGES, 1))  # with all three axes: numpy 1 takes two for a row of vectors
     deviations = np.linalg.solve(system, start).reshape(growth.shape)
-    total: Floats = np.eye(4) + np.einsum('j,njab,njbc->nac', 0.5 * _WEIGHTS, growth, deviations)
+    total: Floats = np.eye(5) + np.einsum('j,njab,njbc->nac', 0.5 * _WEIGHTS, growth, deviations)
     return total
 
 
-def jump(rig: RigParams, before: Segment, after: Segment) -> Floats:
-    """What the strike between two segments does to a deviation, shape (4, 4): the saltation matrix.
+def jump(rig: RigParams, before: Segment, after: Segment, external_force: float = 0.0) -> Floats:
+    """What the strike between two segments does to a deviation, shape (5, 5): the saltation matrix.
 
     R + (f₊ − R f₋) nᵀ / (nᵀ f₋): R the derivative of the strike rule, f the rates, nᵀ x the striking angle. The
     identity where no wheel strikes.
     """
-    matrix = np.eye(4)
+    matrix = np.eye(5)
     f_before, f_after = (
-        rates(rig, segment.at(time), stance_distance(rig, *segment.steps))
+        rates(rig, segment.at(time), stance_distance(rig, *segment.steps), external_force)
         for segment, time in ((before, before.end), (after, after.start))
     )
     for i, wheel in enumerate((rig.front, rig.rear)):
@@ -105,12 +107,16 @@ def jump(rig: RigParams, before: Segment, after: Segment) -> Floats:
     return matrix
 
 
-def motion_derivative(rig: RigParams, segments: Sequence[Segment]) -> Floats:
-    """Derivative of the state at the end of the last segment by that at the start of the first, shape (4, 4).
+def motion_derivative(rig: RigParams, segments: Sequence[Segment], external_force: float = 0.0) -> Floats:
+    """Derivative of [θ1, ω1, θ2, ω2, F] at the end of the last segment by that at the start of the first, shape (5, 5).
 
-    Both at fixed times; the rig's derived defaults are filled in. A strike at the end of the last segment is not in
+    Both at fixed times, with a constant external force [N]; the rig's derived defaults are filled in. A strike at the end of the last segment is not in
     it yet.
     """
-    jumps = [jump(rig, *pair) for pair in pairwise(segments)]
-    factors = [matrix for pair in zip(propagators(rig, segments), [*jumps, np.eye(4)], strict=True) for matrix in pair]
+    jumps = [jump(rig, *pair, external_force) for pair in pairwise(segments)]
+    factors = [
+        matrix
+        for pair in zip(propagators(rig, segments, external_force), [*jumps, np.eye(5)], strict=True)
+        for matrix in pair
+    ]
     return reduce(matmul, reversed(factors))

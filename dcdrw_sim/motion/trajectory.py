@@ -93,8 +93,12 @@ class Run(NamedTuple):
         )
 
 
-def run(rig: RigParams, state: State, seconds: float = math.inf, strikes: float = math.inf) -> Run:
+def run(
+    rig: RigParams, state: State, seconds: float = math.inf, strikes: float = math.inf, external_force: float = 0.0
+) -> Run:
     """Run a pair until a time, a number of strikes, or an end of its own (`End`), whichever is first.
+
+    A constant `external_force` [N] adds to the coupler's, positive in tension.
 
     Raises:
         ValueError: impossible parameters or state, or no sensible limit.
@@ -104,6 +108,7 @@ def run(rig: RigParams, state: State, seconds: float = math.inf, strikes: float 
     if not seconds >= 0.0 or not strikes >= 1 or (math.isinf(seconds) and math.isinf(strikes)):
         raise ValueError(f'a run needs a limit, seconds ≥ 0 or strikes ≥ 1; got seconds {seconds}, strikes {strikes}')
     simulation = Simulation(rig, state)
+    simulation.external_force = external_force
     rig = simulation.rig
     patience = STALL_TIME * math.sqrt(max(rig.front.length, rig.rear.length) / rig.gravity)
     result = Run(rig, [], [], End.TIME)

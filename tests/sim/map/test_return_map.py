@@ -12,7 +12,7 @@ from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.motion.trajectory import run
 from tests.sim.oracle import integrate, paper_rates
-from tests.sim.rigs import ALPHA, GENTLE, UNCOUPLED, UNEQUAL, rigs, rolling, starts
+from tests.sim.rigs import ALPHA, GENTLE, UNCOUPLED, UNEQUAL, between, rigs, rolling, starts
 
 SIN = math.sin(math.pi / 12)
 TABLE = [  # contract §3: D0, k̂, b̂, θ2* [deg], moduli
@@ -106,15 +106,25 @@ def test_the_fourth_raw_state_is_the_length_of_the_coupler():
 # The derivative
 
 
-@given(rigs, starts)
-def test_jacobian_is_that_of_the_papers_equations(rig, start):
-    rig, state, h = rig.resolved(), np.array(rolling(rig, *start)), 1e-6
-    columns = [
-        (paper_rates(rig, rig.S0, state + h * axis) - paper_rates(rig, rig.S0, state - h * axis)) / (2 * h)
-        for axis in np.eye(4)
-    ]
-    exact = jacobian(rig, State(*state), rig.S0)
-    assert exact == pytest.approx(np.array(columns).T, rel=1e-6, abs=1e-6)
+@given(rigs, starts, between(-5.0, 5.0))
+def test_jacobian_is_that_of_the_papers_equations(rig, start, force):
+    rig, point, h = rig.resolved(), np.array([*rolling(rig, *start), force]), 1e-6
+
+    def at(here):
+        return paper_rates(rig, rig.S0, here[:4], here[4])
+
+    columns = [(at(point + h * axis) - at(point - h * axis)) / (2 * h) for axis in np.eye(5)]
+    exact = jacobian(rig, State(*point[:4]), rig.S0, force)
+    assert exact[:4] == pytest.approx(np.array(columns).T, rel=1e-6, abs=1e-6)
+    assert not exact[4].any()
+
+
+def test_the_derivative_by_a_held_force_is_the_limit_of_differences():
+    for force in (0.0, -3.0):
+        state, h = ReturnMap(preset('paper')).at_phase(0.4), 1e-4
+        exact = ReturnMap(preset('paper'), force).linearize(state).by_force
+        ahead, behind = (np.array(ReturnMap(preset('paper'), force + step).step(state)) for step in (h, -h))
+        assert exact == pytest.approx((ahead - behind) / (2.0 * h), rel=1e-6, abs=1e-9)
 
 
 @settings(max_examples=15, deadline=None)
