@@ -1,8 +1,9 @@
 """How small deviations grow along a motion: the variational equation between strikes, and its jumps at them.
 
 A deviation x of [θ1, ω1, θ2, ω2, F], the state and a constant external force in the coupler, follows x' = J x, J the
-Jacobian of the paper's (1) and (2) along the motion; that of F stays. At a strike it jumps by the saltation matrix, because a deviation also moves the strike's time (Leine and
-Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004).
+Jacobian of the paper's (1) and (2) along the motion; that of F stays. At a strike it jumps by the saltation matrix,
+because a deviation also moves the strike's time (Leine and Nijmeijer, Dynamics and Bifurcations of Non-Smooth
+Mechanical Systems, 2004).
 """
 
 from collections.abc import Sequence
@@ -110,8 +111,8 @@ def jump(rig: RigParams, before: Segment, after: Segment, external_force: float 
 def motion_derivative(rig: RigParams, segments: Sequence[Segment], external_force: float = 0.0) -> Floats:
     """Derivative of [θ1, ω1, θ2, ω2, F] at the end of the last segment by that at the start of the first, shape (5, 5).
 
-    Both at fixed times, with a constant external force [N]; the rig's derived defaults are filled in. A strike at the end of the last segment is not in
-    it yet.
+    Both at fixed times, with a constant external force [N]; the rig's derived defaults are filled in. A strike at the
+    end of the last segment is not in it yet.
     """
     jumps = [jump(rig, *pair, external_force) for pair in pairwise(segments)]
     factors = [
