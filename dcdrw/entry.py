@@ -15,6 +15,7 @@ EXECUTABLES = {
     'phase_estimator': 'dcdrw_tracker.gait.phase_estimator_node',
     'sync_monitor': 'dcdrw_tracker.gait.sync_monitor_node',
     'tag_tracker': 'dcdrw_tracker.node.tag_tracker_node',
+    'leg_tracker': 'dcdrw_control.legs.leg_tracker_node',
     'virtual_camera': 'dcdrw_sim.camera.virtual_camera_node',
     'rig_markers': 'dcdrw.nodes.rig_markers_node',
     'recorder': 'dcdrw.nodes.recorder_node',

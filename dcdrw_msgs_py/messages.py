@@ -2,7 +2,7 @@
 
 import math
 from array import array
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from builtin_interfaces.msg import Time
@@ -147,6 +147,15 @@ class JointSampleWriter:
         message.velocity = array('d', (sample.front.rate, sample.rear.rate, rate))
         message.effort = array('d', (math.nan, math.nan, force))
         return message
+
+
+def turns_message(stamp: int, turns: Mapping[str, Turn]) -> Any:
+    """A JointState of angles and their rates, by the joints' names, at a time [ns]."""
+    message = JointState(name=list(turns))
+    message.header.stamp = to_stamp(stamp)
+    message.position = array('d', [turn.angle for turn in turns.values()])
+    message.velocity = array('d', [turn.rate for turn in turns.values()])
+    return message
 
 
 class PhaseSampleWriter:

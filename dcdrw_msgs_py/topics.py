@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from dcdrw_msgs_py.rig import FRONT, REAR
+
 
 class Topic(NamedTuple):
     """A topic of the suite. Names are relative, so that namespaces and remapping work."""
@@ -16,6 +18,8 @@ class Topic(NamedTuple):
     """A late subscriber gets the last message."""
 
 
+SIDES = ('left', 'right')
+"""Of the person in front, and of the robot behind."""
 # 1000 messages are a second at 1 kHz: a reader that stalls for 50 ms loses nothing.
 SAMPLE_DEPTH = 1000
 
@@ -37,6 +41,27 @@ FOOTFALLS = Topic(
 SYNC_ERROR = Topic('sync_error', 'std_msgs/msg/Float64', 'e, rad', SAMPLE_DEPTH)
 SYNC_ERROR_PERCENT = Topic('sync_error_percent', 'std_msgs/msg/Float64', 'e, percent of a step', SAMPLE_DEPTH)
 SYNCHRONIZED = Topic('synchronized', 'std_msgs/msg/Bool', 'whether the pair walks in step', 1, latched=True)
+LEG_SENSORS = {
+    (half, side, kind): Topic(
+        f'{half}/{side}_{kind}', f'{type_}', f'{doc} of the {half} half, on the {side}', SAMPLE_DEPTH
+    )
+    for half in (FRONT, REAR)
+    for kind, type_, doc in (
+        ('imu', 'sensor_msgs/msg/Imu', 'inertial sensor on the foot or the shank'),
+        ('contact', 'std_msgs/msg/Bool', 'whether the foot touches the ground'),
+        ('wrench', 'geometry_msgs/msg/WrenchStamped', 'vertical force under the foot, force.z'),
+    )
+    for side in SIDES
+}
+LEG_JOINT_STATES = Topic(
+    'leg_joint_states', 'sensor_msgs/msg/JointState', 'hip angles, by the names in hip_joints', SAMPLE_DEPTH
+)
+LEG_PHASES = Topic(
+    'leg_phases',
+    'sensor_msgs/msg/JointState',
+    'phase of each leg that is known, front_left and so on: 2π per stride, 0 at heel strike, rad, and its rate',
+    SAMPLE_DEPTH,
+)
 RIG_MARKERS = Topic('rig_markers', 'visualization_msgs/msg/MarkerArray', 'the rig, drawn, at most 30 Hz')
 IMAGE_RAW = Topic('image_raw', 'sensor_msgs/msg/Image', 'the rig as a camera on its left sees it', 2)
 CAMERA_INFO = Topic('camera_info', 'sensor_msgs/msg/CameraInfo', 'lens and sensor of that camera', 2)

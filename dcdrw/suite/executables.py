@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 from dcdrw import entry
 from dcdrw.drawings.rig_markers import MarkerParams
 from dcdrw.recordings.recorder import RecorderParams
+from dcdrw_control.legs.params import LegParams
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.tagging import TagParams
 from dcdrw_msgs_py.topics import (
@@ -18,6 +19,9 @@ from dcdrw_msgs_py.topics import (
     IMAGE_COMPRESSED,
     IMAGE_RAW,
     JOINT_STATES,
+    LEG_JOINT_STATES,
+    LEG_PHASES,
+    LEG_SENSORS,
     PARAMETER_EVENTS,
     PHASE_STATE,
     PHI,
@@ -117,9 +121,17 @@ TAG_TRACKER = Executable(
     by_choice=(IMAGE_COMPRESSED, FRONT_POSE, REAR_POSE),
 )
 
+LEG_TRACKER = Executable(
+    'leg_tracker',
+    "from sensors on people's legs to the phase of each leg, and to wheel rotations",
+    (LegParams,),
+    (*LEG_SENSORS.values(), LEG_JOINT_STATES),
+    (LEG_PHASES, JOINT_STATES, DIAGNOSTICS),
+)
+
 TRIAL = (SIMULATOR, PHASE_ESTIMATOR, SYNC_MONITOR)
 """The nodes of a trial in simulation."""
-EXECUTABLES = (*TRIAL, TAG_TRACKER, VIRTUAL_CAMERA, MARKERS, RECORDER)
+EXECUTABLES = (*TRIAL, TAG_TRACKER, LEG_TRACKER, VIRTUAL_CAMERA, MARKERS, RECORDER)
 
 RECORDED = (
     *dict.fromkeys(

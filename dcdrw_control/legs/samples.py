@@ -5,7 +5,9 @@ from typing import NamedTuple
 
 from dcdrw_control.legs.mounting import Vector
 from dcdrw_control.legs.params import Kind
-from dcdrw_msgs_py.samples import JointSample, Turn
+from dcdrw_msgs_py.rig import FRONT, REAR
+from dcdrw_msgs_py.samples import Turn
+from dcdrw_msgs_py.topics import SIDES
 
 
 class Leg(NamedTuple):
@@ -20,7 +22,8 @@ class Leg(NamedTuple):
         return f'{self.half}_{self.side}'
 
 
-LEGS = tuple(Leg(half, side) for half in ('front', 'rear') for side in ('left', 'right'))
+LEGS = tuple(Leg(half, side) for half in (FRONT, REAR) for side in SIDES)
+"""1 front left, 2 front right, 3 rear left, 4 rear right."""
 
 
 class ImuReading(NamedTuple):
@@ -71,17 +74,11 @@ class LegReading(NamedTuple):
     reading: Reading
 
 
-class LegPhases(NamedTuple):
-    """One `leg_phases` message: where the legs are that are known."""
+class LegUpdate(NamedTuple):
+    """Where the legs are at one time: what `leg_phases` and `joint_states` carry. What is unknown is left out."""
 
     stamp_ns: int
     legs: dict[Leg, Turn]
     """2π per stride, 0 at the first heel strike, unbounded [rad], and its rate [rad/s]."""
-
-
-class LegUpdate(NamedTuple):
-    """What one reading brought."""
-
-    phases: LegPhases | None
-    joints: JointSample | None
-    """The halves as wheels: NaN, or None where both are, while a leg of it is unknown."""
+    wheels: dict[str, Turn]
+    """The rotation ψ of each half as a wheel, by the joint's name [rad], and its rate [rad/s]."""

@@ -12,15 +12,19 @@ from dcdrw_control.legs.half import Half
 from dcdrw_control.legs.hip import HipDetector
 from dcdrw_control.legs.imu import ImuDetector
 from dcdrw_control.legs.params import Kind, LegParams
-from dcdrw_control.legs.phase import LegPhase, LegSample
-from dcdrw_control.legs.samples import KIND_OF, LEGS, Leg, LegPhases, LegReading, LegUpdate, Reading
-from dcdrw_msgs_py.samples import SECOND, JointSample, Turn
+from dcdrw_control.legs.phase import LegPhase
+from dcdrw_control.legs.samples import KIND_OF, LEGS, Leg, LegReading, LegUpdate, Reading
+from dcdrw_msgs_py.samples import SECOND, Turn
+from dcdrw_msgs_py.topics import FRONT_WHEEL, REAR_WHEEL
 
 Refusal = Literal['unreadable', 'not finite', 'repeated', 'reversed', 'future', 'another sensor']
 """Why a reading is refused: its message makes no sense, a value is no number, its stamp stands still, goes back or
 lies ahead of the clock, or another kind of sensor tells of the same leg."""
 RESTART = 1.0
 """Stamps that go back by more are those of a source that starts anew, as a recording that is played again [s]."""
+
+PATIENCE_NS = 20_000_000
+"""The sensors' readings of one time come one after the other: those that lag by more are not waited for."""
 
 _Detector = ImuDetector | ContactDetector | ForceDetector | HipDetector
 _DETECTORS: dict[Kind, type[_Detector]] = {
@@ -37,14 +41,16 @@ class HeelStrike(NamedTuple):
     leg: Leg
     stamp_ns: int
     known_ns: int
-    """The stamp of the reading that made it certain."""
+    """The stamp of the newest reading when it was certain."""
 
 
 class LegStatus(NamedTuple):
     """A snapshot of one leg."""
 
+    heard: bool
+    """Whether a sensor was ever heard of it."""
     kind: Kind | None
-    """The sensor that tells of it; None where none does."""
+    """The sensor that tells of it; None while none does."""
     mounted: bool
     """Whether the sensor's mounting is known."""
     known: bool
@@ -75,12 +81,18 @@ class LegTracker:
     def __init__(self, params: LegParams) -> None:
         self.params = params
         self._tracks = {leg: _Track() for leg in LEGS}
-        self._halves = {'front': Half(params.front.alpha), 'rear': Half(params.rear.alpha)}
+        self._halves: dict[str, tuple[Half, Leg, Leg]] = {
+            FRONT_WHEEL: (Half(params.front.alpha), LEGS[0], LEGS[1]),
+            REAR_WHEEL: (Half(params.rear.alpha), LEGS[2], LEGS[3]),
+        }
         self._refused: dict[Refusal, int] = dict.fromkeys(get_args(Refusal), 0)
-        self._stamp_ns = 0
+        self._newest_ns = 0
         self._published_ns: int | None = None
+        self._struck = False
         self.strikes: list[HeelStrike] = []
         """Those that the last reading brought."""
+        self.refusal: Refusal | None = None
+        """Why the last reading was refused; None where it was not."""
 
     def configure(self, params: LegParams) -> None:
         """Take changed parameters."""
@@ -101,36 +113,45 @@ class LegTracker:
         self.strikes = []
         stamp_ns, leg, _ = reading
         track = self._tracks[leg]
-        refusal = self._refusal(reading, track, now_ns)
-        if refusal:
-            self.refuse(refusal)
+        self.refusal = self._refusal(reading, track, now_ns)
+        if self.refusal:
+            self.refuse(self.refusal)
             return None
-        if track.stamp_ns is not None and stamp_ns - track.stamp_ns > self._silence_ns:
+        if track.stamp_ns is not None and stamp_ns < track.stamp_ns:
+            self._restart()
+        elif track.stamp_ns is not None and stamp_ns - track.stamp_ns > self._silence_ns:
             track.lose()
-        elif track.stamp_ns is not None and stamp_ns < track.stamp_ns:
-            track.lose()
-            self._stamp_ns, self._published_ns = 0, None
-        for event in track.take(reading):
-            if track.phase.take(event):
-                self.strikes.append(HeelStrike(leg, event.stamp_ns, stamp_ns))
-        self._stamp_ns = max(self._stamp_ns, stamp_ns)
-        since_ns = math.inf if self._published_ns is None else self._stamp_ns - self._published_ns
-        if since_ns < (1 if self.strikes else 0.99 * SECOND / self.params.rate):
+        track.take(reading)
+        self._newest_ns = max(self._newest_ns, stamp_ns)
+        heard = [one.stamp_ns for one in self._tracks.values() if one.stamp_ns is not None and self._is_heard(one)]
+        due_ns = max(min(heard), self._newest_ns - PATIENCE_NS)
+        for each, one in self._tracks.items():
+            self.strikes += [HeelStrike(each, struck_ns, self._newest_ns) for struck_ns in one.strikes(due_ns)]
+        self._struck |= bool(self.strikes)
+        since_ns = math.inf if self._published_ns is None else due_ns - self._published_ns
+        if since_ns < (1 if self._struck else 0.99 * SECOND / self.params.rate):
             return None
-        self._published_ns = self._stamp_ns
-        return self._at(self._stamp_ns)
+        self._published_ns, self._struck = due_ns, False
+        return self._at(due_ns)
+
+    def _restart(self) -> None:
+        """Follow a source that starts anew; what was learned stays."""
+        for track in self._tracks.values():
+            track.lose()
+            track.stamp_ns = None
+        self._newest_ns, self._published_ns = 0, None
 
     def status(self) -> LegTrackerStatus:
         """A snapshot."""
         legs = {leg: track.status(self._is_heard(track)) for leg, track in self._tracks.items()}
-        return LegTrackerStatus(self._stamp_ns, legs, self._refused.copy())
+        return LegTrackerStatus(self._newest_ns, legs, self._refused.copy())
 
     @property
     def _silence_ns(self) -> float:
         return self.params.silence * SECOND
 
     def _is_heard(self, track: '_Track') -> bool:
-        return track.stamp_ns is not None and self._stamp_ns - track.stamp_ns <= self._silence_ns
+        return track.stamp_ns is not None and self._newest_ns - track.stamp_ns <= self._silence_ns
 
     def _refusal(self, reading: LegReading, track: '_Track', now_ns: int) -> Refusal | None:
         stamp_ns, _, values = reading
@@ -153,9 +174,10 @@ class LegTracker:
         turns = {
             leg: Turn(math.tau * sample.strides, math.tau * sample.rate) for leg, sample in samples.items() if sample
         }
-        front, rear = (half.update(_pair(samples, name)) for name, half in self._halves.items())
-        joints = JointSample(stamp_ns, front or Turn(), rear or Turn()) if front or rear else None
-        return LegUpdate(LegPhases(stamp_ns, turns) if turns else None, joints)
+        wheels = {
+            joint: half.update((samples[left], samples[right])) for joint, (half, left, right) in self._halves.items()
+        }
+        return LegUpdate(stamp_ns, turns, {joint: turn for joint, turn in wheels.items() if turn})
 
 
 class _Track:
@@ -166,28 +188,37 @@ class _Track:
         self.stamp_ns: int | None = None
         self.phase = LegPhase()
         self._detector: Any = None
+        self._events: list[Event] = []
         self._gaps = 0
 
     def lose(self) -> None:
         """Its sensor was silent: what it did meanwhile is unknown."""
         self._gaps += 1
         self.phase.lose()
-        self._detector.reset()
+        self._events = []
+        if self._detector:
+            self._detector.reset()
 
-    def take(self, reading: LegReading) -> list[Event]:
-        """The events that a reading makes certain."""
+    def take(self, reading: LegReading) -> None:
+        """Take the next reading."""
         stamp_ns, _, values = reading
         kind = KIND_OF[type(values)]
         if kind != self.kind:
             self.kind, self._detector = kind, _DETECTORS[kind]()
         self.stamp_ns = stamp_ns
-        events: list[Event] = self._detector.update(stamp_ns, *values)
-        return events
+        self._events += self._detector.update(stamp_ns, *values)
+
+    def strikes(self, until_ns: int) -> list[int]:
+        """Go on to a time; the heel strikes on the way there."""
+        past = [event for event in self._events if event.stamp_ns <= until_ns]
+        self._events = self._events[len(past) :]
+        return [event.stamp_ns for event in past if self.phase.take(event)]
 
     def status(self, heard: bool) -> LegStatus:
         """A snapshot."""
         phase = self.phase
         return LegStatus(
+            self.kind is not None,
             self.kind if heard else None,
             getattr(self._detector, 'mounted', True),
             heard and phase.known,
@@ -197,10 +228,6 @@ class _Track:
             self._gaps,
             phase.period,
         )
-
-
-def _pair(samples: dict[Leg, LegSample | None], half: str) -> tuple[LegSample | None, LegSample | None]:
-    return samples[Leg(half, 'left')], samples[Leg(half, 'right')]
 
 
 def _finite(values: Reading) -> bool:

@@ -2,18 +2,16 @@
 
 import csv
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dcdrw_control.legs.accuracy import phase_error
 from dcdrw_control.legs.csv_file import read_legs
-from dcdrw_control.legs.params import LegParams
-from dcdrw_control.legs.samples import ImuReading, Leg, LegReading, LegUpdate
-from dcdrw_control.legs.tracker import HeelStrike, LegTracker, LegTrackerStatus
+from dcdrw_control.legs.samples import ImuReading, Leg, LegReading
+from dcdrw_control.legs.walk import Walk
 from tests import ROOT
 
 DATA = ROOT / 'tests' / 'data' / 'gait'
@@ -25,40 +23,9 @@ TURN = (3308 / RATE, 3895 / RATE)
 """From the left foot's last heel strike before the turn to the right foot's first after it [s]."""
 
 Floats = NDArray[np.float64]
-Walk = tuple[Floats, Floats, Floats]
+Signals = tuple[Floats, Floats, Floats]
 """Times [s], (N,); angular rates [rad/s] and accelerations [m/s²], (N, 3)."""
-Change = Callable[[Walk], Walk]
-
-
-class Followed(NamedTuple):
-    """What a tracker made of a walk."""
-
-    strikes: list[HeelStrike]
-    updates: list[LegUpdate]
-    status: LegTrackerStatus
-
-    def strike_seconds(self, leg: Leg) -> Floats:
-        return np.array([strike.stamp_ns for strike in self.strikes if strike.leg == leg]) / 1e9
-
-    def phase(self, leg: Leg) -> tuple[Floats, Floats]:
-        """Times [s] and phase [strides]."""
-        rows = [
-            (u.phases.stamp_ns / 1e9, u.phases.legs[leg].angle / math.tau)
-            for u in self.updates
-            if u.phases and leg in u.phases.legs
-        ]
-        seconds, strides = np.array(rows).T
-        return seconds, strides
-
-
-def follow(readings: Iterable[LegReading], params: LegParams | None = None) -> Followed:
-    tracker, strikes, updates = LegTracker(params or LegParams()), [], []
-    for reading in readings:
-        update = tracker.update(reading)
-        strikes += tracker.strikes
-        if update:
-            updates.append(update)
-    return Followed(strikes, updates, tracker.status())
+Change = Callable[[Signals], Signals]
 
 
 @cache
@@ -67,7 +34,7 @@ def person() -> tuple[LegReading, ...]:
     return tuple(read_legs(DATA / 'imu_sample.csv', RATE).readings)
 
 
-def walk(side: str) -> Walk:
+def signals(side: str) -> Signals:
     mine = [reading for reading in person() if reading.leg.side == side]
     readings = [reading.reading for reading in mine]
     assert all(isinstance(reading, ImuReading) for reading in readings)
@@ -78,8 +45,8 @@ def walk(side: str) -> Walk:
     )
 
 
-def readings(walk: Walk, side: str) -> list[LegReading]:
-    seconds, rates, accelerations = walk
+def readings(signals: Signals, side: str) -> list[LegReading]:
+    seconds, rates, accelerations = signals
     return [
         LegReading(round(t * 1e9), Leg('front', side), ImuReading(tuple(rate), tuple(acceleration)))
         for t, rate, acceleration in zip(seconds.tolist(), rates.tolist(), accelerations.tolist(), strict=True)
@@ -95,14 +62,14 @@ def truth(side: str) -> Floats:
     return np.array(sorted(listed | ({PIVOT} if side == 'left' else set())))
 
 
-def phase_rms_percent(followed: Followed, leg: Leg, truth: Floats, start: float = -math.inf, end: float = math.inf):
+def phase_rms_percent(walk: Walk, leg: Leg, truth: Floats, start: float = -math.inf, end: float = math.inf):
     """Error of the phase from the third stride on, between two times [s], root mean square [% of a stride]."""
-    seconds, strides = followed.phase(leg)
+    seconds, strides = walk.phase(leg)
     part = (seconds >= max(start, truth[3])) & (seconds <= min(end, truth[-1]))
     return 100.0 * float(np.sqrt(np.mean(phase_error(seconds[part], strides[part], truth) ** 2)))
 
 
-def steady_rms_percent(followed: Followed, leg: Leg, truth: Floats, turn: tuple[float, float]) -> float:
+def steady_rms_percent(walk: Walk, leg: Leg, truth: Floats, turn: tuple[float, float]) -> float:
     """The same in steady walking, before and after the turn."""
-    before, after = (phase_rms_percent(followed, leg, truth, *span) for span in ((0.0, turn[0]), (turn[1], math.inf)))
+    before, after = (phase_rms_percent(walk, leg, truth, *span) for span in ((0.0, turn[0]), (turn[1], math.inf)))
     return math.sqrt(0.5 * (before**2 + after**2))

@@ -8,19 +8,19 @@ import pytest
 from dcdrw_control.legs.accuracy import judge_strikes
 from dcdrw_control.legs.csv_file import read_legs
 from dcdrw_control.legs.samples import ContactReading, Leg, LegReading, WrenchReading
+from dcdrw_control.legs.walk import follow
 from tests.control.legs.gait import (
     DATA,
     SIDES,
     TURN,
     Change,
-    Walk,
-    follow,
+    Signals,
     person,
     phase_rms_percent,
     readings,
+    signals,
     steady_rms_percent,
     truth,
-    walk,
 )
 
 LEFT = Leg('front', 'left')
@@ -71,9 +71,8 @@ def test_the_step_that_the_events_leave_out_is_a_step():
 
 
 def test_steps_alternate_from_left_to_right(followed):
-    joints = [update.joints for update in followed.updates if update.joints]
-    seconds = np.array([sample.stamp_ns for sample in joints]) / 1e9
-    psi = np.array([sample.front.angle for sample in joints])
+    turns = [(update.stamp_ns, update.wheels['front_wheel'].angle) for update in followed.updates if update.wheels]
+    seconds, psi = np.array(turns).T * [[1e-9], [1.0]]
     assert (np.diff(psi) >= 0.0).all()
     alpha = math.pi / 12.0
     both = np.sort(np.concatenate([truth(side) for side in SIDES]))
@@ -85,10 +84,10 @@ def test_steps_alternate_from_left_to_right(followed):
 
 
 def interpolated(rate: float) -> Change:
-    def change(walk: Walk) -> Walk:
-        seconds = np.arange(walk[0][0], walk[0][-1], 1.0 / rate)
+    def change(signals: Signals) -> Signals:
+        seconds = np.arange(signals[0][0], signals[0][-1], 1.0 / rate)
         rates, accelerations = (
-            np.stack([np.interp(seconds, walk[0], column) for column in table.T], axis=1) for table in walk[1:]
+            np.stack([np.interp(seconds, signals[0], column) for column in table.T], axis=1) for table in signals[1:]
         )
         return seconds, rates, accelerations
 
@@ -97,42 +96,42 @@ def interpolated(rate: float) -> Change:
 
 def turned(*rows: tuple[float, float, float]) -> Change:
     matrix = np.array(rows)
-    return lambda walk: (walk[0], walk[1] @ matrix, walk[2] @ matrix)
+    return lambda signals: (signals[0], signals[1] @ matrix, signals[2] @ matrix)
 
 
 def noisy(rate_deg: float, acceleration: float) -> Change:
-    def change(walk: Walk) -> Walk:
+    def change(signals: Signals) -> Signals:
         random = np.random.default_rng(3)
         return (
-            walk[0],
-            walk[1] + random.normal(0.0, math.radians(rate_deg), walk[1].shape),
-            walk[2] + random.normal(0.0, acceleration, walk[2].shape),
+            signals[0],
+            signals[1] + random.normal(0.0, math.radians(rate_deg), signals[1].shape),
+            signals[2] + random.normal(0.0, acceleration, signals[2].shape),
         )
 
     return change
 
 
 def without(share: float) -> Change:
-    def change(walk: Walk) -> Walk:
-        kept = np.random.default_rng(4).random(len(walk[0])) >= share
-        return walk[0][kept], walk[1][kept], walk[2][kept]
+    def change(signals: Signals) -> Signals:
+        kept = np.random.default_rng(4).random(len(signals[0])) >= share
+        return signals[0][kept], signals[1][kept], signals[2][kept]
 
     return change
 
 
 def stretched(factor: float) -> Change:
-    return lambda walk: (walk[0] * factor, walk[1] / factor, walk[2])
+    return lambda signals: (signals[0] * factor, signals[1] / factor, signals[2])
 
 
 def offset(rate_deg: tuple[float, float, float], acceleration: tuple[float, float, float]) -> Change:
-    return lambda walk: (walk[0], walk[1] + np.radians(rate_deg), walk[2] + acceleration)
+    return lambda signals: (signals[0], signals[1] + np.radians(rate_deg), signals[2] + acceleration)
 
 
 SEEN_OTHERWISE: dict[str, Change] = {
     'at 50 Hz': interpolated(50.0),
     'at 100 Hz': interpolated(100.0),
     'at 500 Hz': interpolated(500.0),
-    'acceleration in g': lambda walk: (walk[0], walk[1], walk[2] / 9.81),
+    'acceleration in g': lambda signals: (signals[0], signals[1], signals[2] / 9.81),
     'upside down': turned((1, 0, 0), (0, -1, 0), (0, 0, -1)),
     'the other way round': turned((-1, 0, 0), (0, -1, 0), (0, 0, 1)),
     'axes changed': turned((0, 1, 0), (0, 0, 1), (1, 0, 0)),
@@ -150,7 +149,7 @@ SEEN_OTHERWISE: dict[str, Change] = {
 def test_no_mounting_rate_unit_or_cadence_matters(name, side):
     scale = {'a fifth faster': 0.8, 'a fifth slower': 1.2}.get(name, 1.0)
     leg, true = Leg('front', side), truth(side) * scale
-    followed = follow(readings(SEEN_OTHERWISE[name](walk(side)), side))
+    followed = follow(readings(SEEN_OTHERWISE[name](signals(side)), side))
     accuracy = judge_strikes(followed.strike_seconds(leg) / scale, truth(side))
     assert (accuracy.missed, accuracy.false) == (0, 0)
     assert accuracy.close >= 0.9

@@ -13,7 +13,7 @@ from dcdrw_control.legs.samples import (
     WrenchReading,
 )
 from dcdrw_control.legs.tracker import LegTracker
-from tests.control.legs.gait import follow
+from dcdrw_control.legs.walk import follow
 
 LEFT, RIGHT = Leg('front', 'left'), Leg('front', 'right')
 OFFSETS = dict(zip(LEGS, (0.0, 0.5, 0.75, 0.25), strict=True))
@@ -36,16 +36,15 @@ def between(readings: list[LegReading], start: float, end: float) -> list[LegRea
 
 def test_four_legs_turn_two_wheels_half_a_step_apart():
     """A quarter of a stride between the halves is half a step between the wheels."""
-    joints = [update.joints for update in follow(contacts()).updates if update.joints]
     pitch = math.radians(30.0)
-    for sample in joints[-200:]:
-        phase = (sample.front.angle - sample.rear.angle) / pitch % 1.0
-        assert phase == pytest.approx(0.5, abs=0.04)
-        assert sample.front.rate == pytest.approx(2.0 * pitch, rel=0.2)
+    for update in follow(contacts()).updates[-200:]:
+        front, rear = update.wheels['front_wheel'], update.wheels['rear_wheel']
+        assert (front.angle - rear.angle) / pitch % 1.0 == pytest.approx(0.5, abs=0.04)
+        assert front.rate == pytest.approx(2.0 * pitch, rel=0.2)
 
 
 def test_phases_are_two_pi_a_stride_and_zero_at_heel_strike():
-    last = follow(contacts()).updates[-1].phases
+    last = follow(contacts()).updates[-1]
     for leg, turn in last.legs.items():
         expected = math.tau * ((last.stamp_ns / 1e9 + OFFSETS[leg]) % PERIOD)
         assert turn.angle % math.tau == pytest.approx(expected, abs=math.tau * 0.015)
@@ -53,8 +52,9 @@ def test_phases_are_two_pi_a_stride_and_zero_at_heel_strike():
 
 
 def test_one_half_alone_is_told_and_the_other_left_open():
-    joints = [update.joints for update in follow(contacts((LEFT, RIGHT))).updates if update.joints]
-    assert all(math.isfinite(sample.front.angle) and math.isnan(sample.rear.angle) for sample in joints)
+    wheels = [update.wheels for update in follow(contacts((LEFT, RIGHT))).updates]
+    assert wheels[-1].keys() == {'front_wheel'}
+    assert not any('rear_wheel' in known for known in wheels)
 
 
 def test_a_silent_sensor_leaves_a_gap_and_never_a_guess():
@@ -62,22 +62,21 @@ def test_a_silent_sensor_leaves_a_gap_and_never_a_guess():
     followed = follow(silent)
     silence = LegParams().silence
     for update in followed.updates:
-        seconds = update.phases.stamp_ns / 1e9 if update.phases else 0.0
+        seconds = update.stamp_ns / 1e9
         if 5.3 + silence < seconds < 9.0:  # until it strikes again
-            assert LEFT not in update.phases.legs
-            assert RIGHT in update.phases.legs
-            assert math.isnan(update.joints.front.angle)
-            assert math.isfinite(update.joints.rear.angle)
+            assert LEFT not in update.legs
+            assert RIGHT in update.legs
+            assert update.wheels.keys() == {'rear_wheel'}
     assert followed.status.legs[LEFT].gaps == 1
-    assert LEFT in followed.updates[-1].phases.legs
-    assert math.isfinite(followed.updates[-1].joints.front.angle)
+    assert LEFT in followed.updates[-1].legs
+    assert 'front_wheel' in followed.updates[-1].wheels
 
 
 def test_a_recording_that_starts_again_is_followed_again():
     readings = contacts()
     followed = follow([*readings, *readings])
     assert followed.status.refused['reversed'] == 0
-    assert followed.updates[-1].phases.legs.keys() == set(LEGS)
+    assert followed.updates[-1].legs.keys() == set(LEGS)
 
 
 @pytest.mark.parametrize(
@@ -107,12 +106,12 @@ def test_another_sensor_takes_over_once_the_first_is_silent():
     wrenches = [r._replace(reading=WrenchReading(700.0 * r.reading.touches)) for r in contacts(start=6.0)]
     followed = follow([*contacts(end=5.0), *wrenches])
     assert all(status.kind == 'wrench' for status in followed.status.legs.values())
-    assert followed.updates[-1].phases.legs.keys() == set(LEGS)
+    assert followed.updates[-1].legs.keys() == set(LEGS)
 
 
 def test_no_more_is_published_than_the_rate_allows_but_every_strike_is():
     followed = follow(contacts(), LegParams(rate=10.0))
-    stamps = [update.phases.stamp_ns for update in followed.updates if update.phases]
+    stamps = [update.stamp_ns for update in followed.updates]
     strikes = {strike.known_ns for strike in followed.strikes}
     assert len(stamps) <= 10 * 12 + len(strikes)
     assert strikes <= {0, *stamps} | set(sorted(strikes)[:4])
