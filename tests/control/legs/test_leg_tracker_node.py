@@ -1,7 +1,8 @@
 """The node over real DDS, alone and before the estimator and the monitor."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Iterator
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool
 
 from dcdrw_control.legs.accuracy import judge_strikes
-from dcdrw_control.legs.samples import LEGS
+from dcdrw_control.legs.samples import LEGS, Leg
 from dcdrw_msgs_py.messages import stamp_ns, to_stamp
 from dcdrw_msgs_py.topics import (
     DIAGNOSTICS,
@@ -29,55 +30,55 @@ pytestmark = pytest.mark.processes
 
 AHEAD = dict(zip(LEGS, (0.0, 0.5, 0.75, 0.25), strict=True))
 """How far each leg is ahead of the front left one in its stride: the robot's legs lead by a quarter stride."""
-STANCE, RATE, SECONDS = 0.6, 100, 14
+STANCE, RATE = 0.6, 100
 
 
-def play(bench: Bench, messages: list[tuple[int, Any, Any]], times: int = 3) -> None:
-    """Publish messages in the order of time, some times as fast as they were taken."""
-    start_ns, started = messages[0][0], bench.node.get_clock().now().nanoseconds
-    for when_ns, publisher, message in messages:
-        while (bench.node.get_clock().now().nanoseconds - started) * times < when_ns - start_ns:
-            bench.executor.spin_once(timeout_sec=0.001)
-        publisher.publish(message)
-    bench.spin(0.2)
+class Player:
+    """Publishes messages as their time comes; called again and again, as a condition that has yet to hold."""
+
+    def __init__(self, bench: Bench, messages: Iterator[tuple[int, Any, Any]]) -> None:
+        self._bench, self._messages = bench, messages
+        self._next = next(messages, None)
+
+    def __call__(self) -> bool:
+        """Publish what is due; whether all has been."""
+        while self._next and self._next[0] <= self._bench.node.get_clock().now().nanoseconds:
+            self._next[1].publish(self._next[2])
+            self._next = next(self._messages, None)
+        return self._next is None
 
 
-def four_legs(make: Callable[[bool], Any], publishers: dict, epoch_ns: int) -> list[tuple[int, Any, Any]]:
-    """Messages of four legs that walk evenly, a stride a second."""
-    made = []
-    for index in range(RATE * SECONDS):
+def four_legs(publishers: dict[Leg, Any], epoch_ns: int) -> Iterator[tuple[int, Any, Any]]:
+    """What is under four feet that walk evenly, a stride a second, without end."""
+    for index in count():
         when_ns = epoch_ns + index * 10**9 // RATE
         for leg in LEGS:
-            message = make((index / RATE + AHEAD[leg]) % 1.0 < STANCE)
+            message = WrenchStamped()
             message.header.stamp = to_stamp(when_ns)
-            made.append((when_ns, publishers[leg], message))
-    return made
+            message.wrench.force.z = 700.0 * ((index / RATE + AHEAD[leg]) % 1.0 < STANCE)
+            yield when_ns, publishers[leg], message
 
 
-def wrench(touches: bool) -> Any:
-    message = WrenchStamped()
-    message.wrench.force.z = 700.0 * touches
-    return message
+def worn_imus(publishers: dict[Leg, Any], epoch_ns: int) -> Iterator[tuple[int, Any, Any]]:
+    """What the sensors on a person's feet told, for ten seconds."""
+    for stamp, leg, reading in person():
+        if stamp > 10 * 10**9:
+            return
+        message = Imu()
+        message.header.stamp = to_stamp(epoch_ns + stamp)
+        turning, pulling = message.angular_velocity, message.linear_acceleration
+        turning.x, turning.y, turning.z = reading.rate
+        pulling.x, pulling.y, pulling.z = reading.acceleration
+        yield epoch_ns + stamp, publishers[leg], message
 
 
 def test_a_recorded_person_walks_through_the_node(bench):
     bench.start('leg_tracker')
     phases = bench.hear(LEG_PHASES)
     publishers = {leg: bench.publisher(LEG_SENSORS[leg.half, leg.side, 'imu']) for leg in LEGS[:2]}
-    epoch_ns = bench.node.get_clock().now().nanoseconds - 60 * 10**9
-    messages = []
-    for stamp, leg, reading in person():
-        if stamp > 10 * 10**9:
-            break
-        message = Imu()
-        message.header.stamp = to_stamp(epoch_ns + stamp)
-        for field, values in (
-            (message.angular_velocity, reading.rate),
-            (message.linear_acceleration, reading.acceleration),
-        ):
-            field.x, field.y, field.z = values
-        messages.append((epoch_ns + stamp, publishers[leg], message))
-    play(bench, messages, times=1)
+    epoch_ns = bench.node.get_clock().now().nanoseconds
+    bench.wait(Player(bench, worn_imus(publishers, epoch_ns)), 'the end of the walk')
+    bench.spin(0.5)
     for leg in LEGS[:2]:
         rows = [
             (stamp_ns(m.header.stamp) - epoch_ns, m.position[m.name.index(str(leg))])
@@ -100,9 +101,8 @@ def test_four_legs_are_two_wheels_for_the_estimator_and_the_monitor(bench):
     joints, states, verdicts = bench.hear(JOINT_STATES), bench.hear(PHASE_STATE), bench.hear(SYNCHRONIZED)
     publishers = {leg: bench.publisher(LEG_SENSORS[leg.half, leg.side, 'wrench']) for leg in LEGS}
     bench.publisher(JOINT_STATES, readers=2)  # the estimator has been found, as the bench has
-    epoch_ns = bench.node.get_clock().now().nanoseconds - 60 * 10**9
-    play(bench, four_legs(wrench, publishers, epoch_ns))
-    bench.wait(lambda: verdicts and verdicts[-1].data, 'the verdict')
+    play = Player(bench, four_legs(publishers, bench.node.get_clock().now().nanoseconds))
+    bench.wait(lambda: play() or (verdicts and verdicts[-1].data), 'the verdict', limit=60.0)
     last = joints[-1]
     assert sorted(last.name) == ['front_wheel', 'rear_wheel']
     assert len(states) > 0.8 * len([message for message in joints if len(message.name) == 2])
