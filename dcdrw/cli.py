@@ -19,6 +19,7 @@ COMMANDS = {
     'record': Command('record', 'record a running suite'),
     'replay': Command('replay', 'publish recorded joint states again'),
     'analyze': Command('analyze', 'judge recorded trials'),
+    'legs': Command('legs', "follow people's legs by their sensors"),
     'report': Command('report', 'recorded trials on one page'),
     'film': Command('film', 'film a simulated trial, with its ground truth'),
     'tags': Command('tag_sheet', 'print the tags of the wheels, true to scale'),
@@ -42,6 +43,7 @@ examples:
   dcdrw live --trial                      watch a simulated trial in the browser
   dcdrw record --note 'new springs'       record the nodes that run on this machine or network
   dcdrw analyze trials/first trials/second
+  dcdrw legs walk.csv --rate 204.8        people's heel strikes and phase, from sensors on their legs
   dcdrw report trials/* --out today.html  a day of trials on one page
   dcdrw design --slope-deg 2.5            which spring and dashpot to buy
   dcdrw map --rig my_rig.yaml             how fast the pair falls into step: multipliers of the return map

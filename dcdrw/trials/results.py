@@ -3,16 +3,18 @@
 import csv
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from dcdrw.recordings.joint_batch import JointBatch
+from dcdrw.recordings.leg_recording import find_topic, leg_topics, namespace_of, wheel_batches
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw.trials.agreement import Agreement, compare
 from dcdrw.trials.analysis import Analysis, analyze
 from dcdrw.trials.figure import draw_trial
+from dcdrw.trials.leg_walk import follow_recording
 from dcdrw.trials.summary import sentence, summarize
 from dcdrw_msgs_py.samples import Footfall
 from dcdrw_msgs_py.topics import JOINT_STATES
@@ -37,17 +39,32 @@ def read_trial(
 
     """
     with Recording(path) as recording:
-        name = recording.find(topic)
+        name, batches = _joint_states(recording, topic, rig)
         if params is None:
             params = TrialParams()
             if recording.parameters:
                 params = read_parameter_file(recording.parameters, params)
         if rig:
             params = read_parameter_file(rig, params)
-        trial = analyze(_shown(recording.joints(name), recording.count(name)), params)
+        trial = analyze(batches, params)
         if trial.unreadable and not len(trial.motion.stamp_ns):
             raise ValueError(f'{path}: {name}: {trial.unreadable} (front_joint and rear_joint in a rig file name them)')
         return trial, compare(recording, trial, name.rpartition('/')[0])
+
+
+def _joint_states(recording: Recording, topic: str, rig: Path | None) -> tuple[str, Iterable[JointBatch]]:
+    """The topic's name, and what it holds; where only sensors on legs were recorded, what leg_tracker makes of them."""
+    legs = leg_topics(recording)
+    if not legs or topic != JOINT_STATES.name or find_topic(recording, JOINT_STATES):
+        name = recording.find(topic)
+        return name, _shown(recording.joints(name), recording.count(name))
+    updates = follow_recording(recording, rig).updates
+    if not any(len(update.wheels) == 2 for update in updates):
+        raise ValueError(
+            f'{recording.path}: a trial needs both legs of both halves at one time, dcdrw legs only one leg; '
+            f'recorded are {", ".join(legs)}'
+        )
+    return f'{namespace_of(legs[0])}/{topic}', wheel_batches(updates)
 
 
 def _shown(batches: Iterator[JointBatch], total: int) -> Iterator[JointBatch]:

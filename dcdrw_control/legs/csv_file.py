@@ -21,13 +21,15 @@ from dcdrw_control.legs.samples import (
     Reading,
     WrenchReading,
 )
+from dcdrw_msgs_py.rig import FRONT
 from dcdrw_msgs_py.samples import SECOND
+from dcdrw_msgs_py.topics import SIDES
 
 Floats = NDArray[np.float64]
 
 FASTEST = 35.0
 """No leg turns faster [rad/s], and gyroscopes end at 2000 degrees per second: a file with larger rates is in deg/s."""
-_COLUMN = re.compile(r'(?:(front|rear)_)?(left|right)_(acc_[xyz]|gyr_[xyz]|contact|force|hip|hip_rate)')
+_COLUMN = re.compile(r'(?:(front|rear)_)?(?:(left|right)_)?(acc_[xyz]|gyr_[xyz]|contact|force|hip|hip_rate)')
 _TIMES = {'time': 1.0, 'time_s': 1.0, 'stamp_ns': 1.0 / SECOND}
 
 
@@ -47,8 +49,9 @@ def read_legs(path: Path, rate: float = math.nan) -> LegTable:
 
     The columns are named, in one row or in two (sensor, axis): a first column `time` [s], `stamp_ns` or the sample's
     number, then for each leg `left_acc_x`, …, `left_gyr_z`, `left_contact` (0 or 1), `left_force` [N], `left_hip`
-    [rad] or `left_hip_rate` [rad/s], with `front_` or `rear_` before it where there are two halves. Columns of other
-    names are passed over. A file of two columns without names is the time [s] and the left foot's vertical force [N].
+    [rad] or `left_hip_rate` [rad/s], with `front_` or `rear_` before it where there are two halves, and without the
+    side where there is one leg. Columns of other names are passed over. A file of two columns without names is the
+    time [s] and the left foot's vertical force [N].
 
     Args:
         path: the file.
@@ -63,10 +66,10 @@ def read_legs(path: Path, rate: float = math.nan) -> LegTable:
     seconds = _seconds(path, names[0], table[:, 0], rate)
     stamps = np.round(seconds * SECOND).astype(np.int64).tolist()
     columns: dict[Leg, dict[str, Floats]] = defaultdict(dict)
-    for name, column in zip(names[1:], table[:, 1:].T, strict=True):
+    for name, column in zip(names, table.T, strict=True):
         found = _COLUMN.fullmatch(name)
         if found:
-            columns[Leg(found[1] or 'front', found[2])][found[3]] = column
+            columns[Leg(found[1] or FRONT, found[2] or SIDES[0])][found[3]] = column
     rates = [column for quantities in columns.values() for name, column in quantities.items() if name[:3] == 'gyr']
     degrees = bool(rates) and float(np.nanmax(np.abs(rates))) > FASTEST
     parts = [
@@ -108,7 +111,7 @@ def _seconds(path: Path, name: str, first: Floats, rate: float) -> Floats:
     if not math.isnan(rate):
         seconds = np.arange(len(first)) / rate
     elif name in _TIMES:
-        seconds = (first - first[0]) * _TIMES[name]
+        seconds = first * _TIMES[name]
     else:
         raise ValueError(f'{path} has no column time or stamp_ns: tell how many samples a second it has (--rate)')
     if not (np.diff(seconds) > 0.0).all():

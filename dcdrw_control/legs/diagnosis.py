@@ -20,7 +20,7 @@ def diagnose_legs(status: LegTrackerStatus, age: float, stale_after: float) -> D
     level, message = _judge(status, age, stale_after)
     values: dict[str, str] = {}
     for leg, one in status.legs.items():
-        values[f'{leg} sensor'] = one.kind or 'none'
+        values[f'{leg} sensor'] = one.sensor or 'none'
         values[f'{leg} strikes'] = str(one.strikes)
         values[f'{leg} stride [s]'] = f'{one.period:.3f}' if math.isfinite(one.period) else 'unknown'
         values[f'{leg} strikes missed'] = str(one.missed)
@@ -35,7 +35,7 @@ def _judge(status: LegTrackerStatus, age: float, stale_after: float) -> tuple[Le
     if not age <= stale_after:
         return Level.STALE, f'stale: no reading for {age:.1f} s' if math.isfinite(age) else 'no data yet'
     legs = {leg: one for leg, one in status.legs.items() if one.heard}
-    if silent := [leg for leg, one in legs.items() if one.kind is None]:
+    if silent := [leg for leg, one in legs.items() if one.silent]:
         return Level.WARN, f'silent: the sensor of {_names(silent)}'
     if lonely := [half for half in ('front', 'rear') if len([leg for leg in legs if leg.half == half]) == 1]:
         return Level.WARN, f'only one leg of the {lonely[0]} half has a sensor'

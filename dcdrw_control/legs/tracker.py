@@ -47,15 +47,16 @@ class HeelStrike(NamedTuple):
 class LegStatus(NamedTuple):
     """A snapshot of one leg."""
 
-    heard: bool
-    """Whether a sensor was ever heard of it."""
-    kind: Kind | None
-    """The sensor that tells of it; None while none does."""
+    sensor: Kind | None
+    """The sensor that was heard last; None where none ever was."""
+    silent: bool
+    """Whether it is not heard now."""
     mounted: bool
     """Whether the sensor's mounting is known."""
     known: bool
     """Whether its phase is known."""
     strikes: int
+    """With the missed ones."""
     missed: int
     """Strikes that were overdue and counted without having been seen."""
     doubled: int
@@ -64,6 +65,11 @@ class LegStatus(NamedTuple):
     """How often its sensor was silent."""
     period: float
     """The usual stride [s]; NaN before one was seen."""
+
+    @property
+    def heard(self) -> bool:
+        """Whether a sensor was ever heard of it."""
+        return self.sensor is not None
 
 
 class LegTrackerStatus(NamedTuple):
@@ -218,8 +224,8 @@ class _Track:
         """A snapshot."""
         phase = self.phase
         return LegStatus(
-            self.kind is not None,
-            self.kind if heard else None,
+            self.kind,
+            self.kind is not None and not heard,
             getattr(self._detector, 'mounted', True),
             heard and phase.known,
             phase.strikes,

@@ -22,9 +22,13 @@ class Walk(NamedTuple):
     """What the node would have published."""
     status: LegTrackerStatus
 
+    def strikes_of(self, leg: Leg) -> list[HeelStrike]:
+        """The heel strikes of a leg that were seen."""
+        return [strike for strike in self.strikes if strike.leg == leg]
+
     def strike_seconds(self, leg: Leg) -> Floats:
         """When the heel of a leg struck [s]."""
-        return np.array([strike.stamp_ns for strike in self.strikes if strike.leg == leg], float) / 1e9
+        return np.array([strike.stamp_ns for strike in self.strikes_of(leg)], float) / 1e9
 
     def phase(self, leg: Leg) -> tuple[Floats, Floats]:
         """Times [s] at which the phase of a leg is known, and the phase [strides]."""

@@ -22,7 +22,7 @@ def test_a_file_of_two_heading_rows_is_read_with_its_rate():
 
 def test_a_file_without_heading_is_time_and_force():
     table = read_legs(DATA / 'example_vertical_grf.csv')
-    assert table.readings[0] == LegReading(0, LEFT, WrenchReading(235.311661))
+    assert table.readings[0] == LegReading(534_133_513_000, LEFT, WrenchReading(235.311661))
     assert table.rate == pytest.approx(100.0, rel=0.01)
 
 
@@ -35,7 +35,7 @@ def test_every_sensor_of_every_leg_has_columns(tmp_path):
     )
     table = read_legs(path)
     assert not table.degrees
-    first = {reading.leg: reading.reading for reading in table.readings if reading.stamp_ns == 0}
+    first = {reading.leg: reading.reading for reading in table.readings if reading.stamp_ns == 500_000_000}
     hip = first.pop(Leg('rear', 'right'))
     assert first == {
         LEFT: ImuReading((1.0, 2.0, 3.0), (0.0, 0.0, 9.8)),
@@ -45,6 +45,14 @@ def test_every_sensor_of_every_leg_has_columns(tmp_path):
     assert isinstance(hip, HipReading)
     assert hip.angle == 0.2
     assert math.isnan(hip.rate)
+
+
+def test_a_file_of_one_leg_names_no_side_and_needs_no_time_where_the_rate_is_given(tmp_path):
+    path = tmp_path / 'one.csv'
+    path.write_text('force\n700\n690\n0\n')
+    table = read_legs(path, rate=10.0)
+    assert [reading.stamp_ns for reading in table.readings] == [0, 100_000_000, 200_000_000]
+    assert {reading.leg for reading in table.readings} == {LEFT}
 
 
 @pytest.mark.parametrize(

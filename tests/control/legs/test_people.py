@@ -162,7 +162,7 @@ def test_no_mounting_rate_unit_or_cadence_matters(name, side):
 def plate() -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and vertical force [N] of a foot on a treadmill."""
     table = np.loadtxt(DATA / 'example_vertical_grf.csv', delimiter=',')
-    return table[:, 0] - table[0, 0], table[:, 1]
+    return table[:, 0], table[:, 1]
 
 
 def at_50_newtons(seconds: np.ndarray, force: np.ndarray) -> np.ndarray:

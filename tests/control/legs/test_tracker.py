@@ -105,7 +105,7 @@ def test_a_reading_that_cannot_be_is_refused_and_counted(reading, why):
 def test_another_sensor_takes_over_once_the_first_is_silent():
     wrenches = [r._replace(reading=WrenchReading(700.0 * r.reading.touches)) for r in contacts(start=6.0)]
     followed = follow([*contacts(end=5.0), *wrenches])
-    assert all(status.kind == 'wrench' for status in followed.status.legs.values())
+    assert all(status.sensor == 'wrench' for status in followed.status.legs.values())
     assert followed.updates[-1].legs.keys() == set(LEGS)
 
 

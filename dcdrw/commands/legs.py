@@ -1,0 +1,48 @@
+"""`dcdrw legs`: sensors on people's legs in; heel strikes and the phase of each leg out."""
+
+import argparse
+import math
+from pathlib import Path
+
+from dcdrw.arguments import positive
+from dcdrw.trials.leg_walk import read_walk, sentences, summarize_walk, write_walk
+
+_EPILOG = """\
+FILE is a recording with the topics that leg_tracker takes, or a .csv whose columns are named: time [s] or stamp_ns,
+then of each leg left_acc_x … left_gyr_z, left_contact (0 or 1), left_force [N] or left_hip [rad], with front_ or
+rear_ before it where there are two halves, and without the side where there is one leg. Two heading rows (sensor,
+axis) do, too; two columns without a heading are the time and one foot's force. Angular rates beyond 35 are taken to
+be in deg/s, for no leg turns so fast in rad/s.
+
+DIR gets summary.json, and
+  heel_strikes.csv  each heel strike: leg, stamp_ns, and the stamp known_ns of the reading that made it certain
+  phases.csv        stamp_ns; 2π per stride of each leg [rad]; ψ of each half as a wheel [rad]; empty where unknown
+Exit status: 0 done, 2 wrong input.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Describe the command, and declare what it takes."""
+    parser.description = "Follow people's legs by their sensors, as leg_tracker does, as fast as it goes."
+    parser.epilog = _EPILOG
+    parser.add_argument('file', type=Path, metavar='FILE')
+    parser.add_argument(
+        '--rate', type=positive, default=math.nan, metavar='HZ', help='of a .csv that does not tell its times'
+    )
+    parser.add_argument('--rig', type=Path, metavar='FILE.yaml', help='parameters of leg_tracker that differ')
+    parser.add_argument('--out', type=Path, metavar='DIR', help='write the results here; must not exist, or be empty')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command; returns the exit status."""
+    folder = options.out
+    if folder and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise ValueError(f'{folder} exists already, not overwriting; choose another --out')
+    walk = read_walk(options.file, options.rate, options.rig)
+    for line in sentences(summarize_walk(walk)):
+        print(line)
+    if folder:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_walk(walk, folder, source=str(options.file))
+        print(f'Written: {folder}/')
+    return 0

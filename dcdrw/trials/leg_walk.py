@@ -1,0 +1,114 @@
+"""A walk of people: read from a CSV file or a recording, followed, told and written."""
+
+import csv
+import json
+import math
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dcdrw.recordings.leg_recording import leg_readings, leg_topics
+from dcdrw.recordings.recording import Recording
+from dcdrw.suite.parameter_file import read_parameter_file
+from dcdrw_control.legs.csv_file import read_legs
+from dcdrw_control.legs.params import LegParams
+from dcdrw_control.legs.samples import LEGS, Leg
+from dcdrw_control.legs.walk import Walk, follow
+from dcdrw_msgs_py.topics import FRONT_WHEEL, REAR_WHEEL
+
+PAUSE = 2.0
+"""Strides that take this many times the median are pauses: they are left out of the mean."""
+
+
+class WalkParams(NamedTuple):
+    """The parameters of leg_tracker."""
+
+    legs: LegParams = LegParams()
+
+
+def read_walk(path: Path, rate: float = math.nan, rig: Path | None = None) -> Walk:
+    """Follow the legs in a CSV file, or in a recording of their sensors.
+
+    Args:
+        path: the file, or the recording.
+        rate: of a CSV file that does not tell its times [Hz].
+        rig: a parameter file; of a recording, it takes the place of what was recorded.
+
+    Raises:
+        ValueError: what is in a file cannot be used; the mend is told.
+        OSError: a file cannot be read.
+
+    """
+    if path.suffix.lower() == '.csv':
+        params = read_parameter_file(rig, WalkParams()) if rig else WalkParams()
+        return follow(read_legs(path, rate).readings, params.legs)
+    with Recording(path) as recording:
+        if not leg_topics(recording):
+            raise ValueError(f'{path} has no topic of a sensor on a leg, as front/left_imu')
+        return follow_recording(recording, rig)
+
+
+def follow_recording(recording: Recording, rig: Path | None = None) -> Walk:
+    """Follow the legs whose sensors were recorded, as the node would have done."""
+    params = WalkParams()
+    for file in filter(None, (recording.parameters, rig)):
+        params = read_parameter_file(file, params)
+    return follow(leg_readings(recording, params.legs.hip_joints), params.legs)
+
+
+def summarize_walk(walk: Walk) -> dict[str, dict[str, Any]]:
+    """What came of it, for a program, by the legs that were heard of."""
+    return {str(leg): _summarize(walk, leg) for leg in LEGS if walk.status.legs[leg].heard}
+
+
+def _summarize(walk: Walk, leg: Leg) -> dict[str, Any]:
+    status, strides = walk.status.legs[leg], np.diff(walk.strike_seconds(leg))
+    steady = strides[strides < PAUSE * np.median(strides)] if len(strides) else strides
+    return {
+        'sensor': status.sensor,
+        'strikes': len(walk.strikes_of(leg)),
+        'stride_s': round(float(np.mean(steady)), 4) if len(steady) else None,
+        'stride_deviation_s': round(float(np.std(steady)), 4) if len(steady) else None,
+        'missed': status.missed,
+        'doubled': status.doubled,
+        'gaps': status.gaps,
+        'mounting_known': status.mounted,
+    }
+
+
+def sentences(summary: dict[str, dict[str, Any]]) -> list[str]:
+    """A line for each leg."""
+    return [f'{leg} ({one["sensor"]}): {_told(one)}' for leg, one in summary.items()]
+
+
+def _told(one: dict[str, Any]) -> str:
+    if not one['mounting_known']:
+        return 'its mounting is not known: it takes a few steps, and an impact at each heel strike'
+    told = [f'{one["strikes"]} heel strikes']
+    if one['stride_s'] is not None:
+        told.append(f'stride {one["stride_s"]:.3f} ± {one["stride_deviation_s"]:.3f} s')
+    told += [f'{one[what]} {what}' for what in ('missed', 'doubled', 'gaps') if one[what]]
+    return ', '.join(told)
+
+
+def write_walk(walk: Walk, folder: Path, **more: Any) -> None:
+    """Write summary.json, heel_strikes.csv and phases.csv into a folder.
+
+    Raises:
+        OSError: the disk is full, say.
+
+    """
+    content = json.dumps({**more, 'legs': summarize_walk(walk)}, indent=1, ensure_ascii=False)
+    (folder / 'summary.json').write_text(content + '\n', encoding='utf-8')
+    with (folder / 'heel_strikes.csv').open('w', encoding='utf-8', newline='') as file:
+        writer = csv.writer(file)
+        writer.writerow(('leg', 'stamp_ns', 'known_ns'))
+        writer.writerows(walk.strikes)
+    legs, wheels = [leg for leg in LEGS if walk.status.legs[leg].heard], (FRONT_WHEEL, REAR_WHEEL)
+    with (folder / 'phases.csv').open('w', encoding='utf-8', newline='') as file:
+        writer = csv.writer(file)
+        writer.writerow(('stamp_ns', *map(str, legs), *wheels))
+        for update in walk.updates:
+            turns = [*(update.legs.get(leg) for leg in legs), *(update.wheels.get(wheel) for wheel in wheels)]
+            writer.writerow((update.stamp_ns, *(turn.angle if turn else '' for turn in turns)))
