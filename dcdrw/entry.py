@@ -17,6 +17,7 @@ EXECUTABLES = {
     'tag_tracker': 'dcdrw_tracker.node.tag_tracker_node',
     'leg_tracker': 'dcdrw_control.legs.leg_tracker_node',
     'virtual_camera': 'dcdrw_sim.camera.virtual_camera_node',
+    'synchronizer': 'dcdrw_control.sync.synchronizer_node',
     'rig_markers': 'dcdrw.nodes.rig_markers_node',
     'recorder': 'dcdrw.nodes.recorder_node',
 }

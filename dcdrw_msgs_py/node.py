@@ -12,7 +12,7 @@ from contextlib import suppress
 from difflib import get_close_matches
 from importlib import import_module
 from itertools import pairwise
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
 import rclpy
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
@@ -250,6 +250,14 @@ def _warn_of_unknown(node: Node, arguments: list[str]) -> None:
             node.get_logger().warning(f'no parameter is named {name}, so it has no effect; {hint}')
 
 
+@runtime_checkable
+class HasLastWords(Protocol):
+    """A node that has something to publish before it ends in order."""
+
+    def say_last_words(self) -> None:
+        """Publish what must not be left as it is."""
+
+
 def run(name: str, make_node: Callable[[], Node], args: list[str] | None = None) -> int:
     """Run one node until SIGINT, SIGTERM or shutdown; returns the process's exit status.
 
@@ -283,6 +291,8 @@ def run(name: str, make_node: Callable[[], Node], args: list[str] | None = None)
             executor.spin_once(timeout_sec=SPIN_SECONDS)
     # A thread without Python ends what hangs: DDS may hold the interpreter.
     faulthandler.dump_traceback_later(END_SECONDS, exit=True, file=open(os.devnull, 'w'))  # noqa: SIM115
+    if isinstance(node, HasLastWords):
+        node.say_last_words()
     # In this order, so that no thread of DDS outlives what it works on: neither waits for Python's own end.
     executor.shutdown()
     node.destroy_node()

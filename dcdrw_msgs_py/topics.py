@@ -32,6 +32,13 @@ JOINT_STATES = Topic(
 COUPLER_FORCE_COMMAND = Topic(
     'coupler_force_command', 'std_msgs/msg/Float64', 'force added to the coupler, N; zero when stale'
 )
+ENABLE = Topic('enable', 'std_msgs/msg/Bool', 'heartbeat of at least 10 Hz that lets the robot push; expired is false')
+COUPLER_WRENCH = Topic(
+    'coupler_wrench', 'geometry_msgs/msg/WrenchStamped', 'the commanded force, stamped: force.x in N, tension positive'
+)
+SYNCHRONIZER_STATE = Topic(
+    'synchronizer_state', 'std_msgs/msg/String', 'disabled, armed, active, ramp_down or fault', 1, latched=True
+)
 PHASE_STATE = Topic('phase_state', 'sensor_msgs/msg/JointState', 'stance angles, φ and step difference', SAMPLE_DEPTH)
 PHI = Topic('phi', 'std_msgs/msg/Float64', 'φ, rad', SAMPLE_DEPTH)
 STEP_DIFFERENCE = Topic('step_difference', 'std_msgs/msg/Int32', 'n = n1 − n2', SAMPLE_DEPTH)

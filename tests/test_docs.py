@@ -7,9 +7,9 @@ from dcdrw.suite.tables import updated
 from tests import ROOT
 
 
-def test_tables_of_the_readme_are_current():
-    text = (ROOT / 'README.md').read_text(encoding='utf-8')
-    assert updated(text) == text, 'run: python -m dcdrw.suite.tables README.md'
+def test_tables_of_the_reference_are_current():
+    text = (ROOT / 'docs' / 'reference.md').read_text(encoding='utf-8')
+    assert updated(text) == text, 'run: python -m dcdrw.suite.tables docs/reference.md'
 
 
 def test_a_table_without_a_place_is_told():

@@ -6,14 +6,17 @@ from dcdrw import entry
 from dcdrw.drawings.rig_markers import MarkerParams
 from dcdrw.recordings.recorder import RecorderParams
 from dcdrw_control.legs.params import LegParams
+from dcdrw_control.sync.synchronizer import SynchronizerParams
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.tagging import TagParams
 from dcdrw_msgs_py.topics import (
     CAMERA_INFO,
     CLOCK,
     COUPLER_FORCE_COMMAND,
+    COUPLER_WRENCH,
     DEBUG_IMAGE,
     DIAGNOSTICS,
+    ENABLE,
     FOOTFALLS,
     FRONT_POSE,
     IMAGE_COMPRESSED,
@@ -31,6 +34,7 @@ from dcdrw_msgs_py.topics import (
     SYNC_ERROR,
     SYNC_ERROR_PERCENT,
     SYNCHRONIZED,
+    SYNCHRONIZER_STATE,
     TAG_DETECTIONS,
     Topic,
 )
@@ -129,9 +133,18 @@ LEG_TRACKER = Executable(
     (LEG_PHASES, JOINT_STATES, DIAGNOSTICS),
 )
 
+SYNCHRONIZER = Executable(
+    'synchronizer',
+    'from the phase to a bounded force that brings the pair into step, while somebody enables it',
+    (SynchronizerParams,),
+    (PHASE_STATE, ENABLE),
+    (COUPLER_FORCE_COMMAND, COUPLER_WRENCH, SYNCHRONIZER_STATE, DIAGNOSTICS),
+    ('~/stop (std_srvs/srv/Trigger)', '~/reset_fault (std_srvs/srv/Trigger)'),
+)
+
 TRIAL = (SIMULATOR, PHASE_ESTIMATOR, SYNC_MONITOR)
 """The nodes of a trial in simulation."""
-EXECUTABLES = (*TRIAL, TAG_TRACKER, LEG_TRACKER, VIRTUAL_CAMERA, MARKERS, RECORDER)
+EXECUTABLES = (*TRIAL, TAG_TRACKER, LEG_TRACKER, SYNCHRONIZER, VIRTUAL_CAMERA, MARKERS, RECORDER)
 
 RECORDED = (
     *dict.fromkeys(

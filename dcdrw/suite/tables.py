@@ -1,6 +1,6 @@
-"""The README's tables, from the declarations in the code.
+"""The reference's tables, from the declarations in the code.
 
-`python -m dcdrw.suite.tables README.md` brings them up to date.
+`python -m dcdrw.suite.tables docs/reference.md` brings them up to date.
 """
 
 import math

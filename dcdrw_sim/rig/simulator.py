@@ -37,7 +37,7 @@ class SimulatorParams(NamedTuple):
     seed: Annotated[int, Quantity('of noise and losses', low=0)] = 0
     command_timeout: Annotated[
         float, Quantity('a coupler_force_command older than this counts as 0', 's', above=0.0, live=True)
-    ] = 0.2
+    ] = 0.08
 
     def check_pace(self) -> None:
         """Refuse a pace that leaves the clock behind.

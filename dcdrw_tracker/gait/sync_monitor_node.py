@@ -55,6 +55,10 @@ class SyncMonitorNode(Node):
         if self._verdict and self._age.seconds > self._settings.value.stale_after:
             self._tell(False)
 
+    def say_last_words(self) -> None:
+        """A monitor that has ended vouches for nothing."""
+        self._tell(False)
+
     def _tell(self, synchronized: bool) -> None:
         if synchronized != self._verdict:
             self._verdict = synchronized

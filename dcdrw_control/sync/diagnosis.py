@@ -1,0 +1,39 @@
+"""What the synchronizer says of itself on `/diagnostics`."""
+
+import math
+
+from dcdrw_control.sync.safety import Fault, State
+from dcdrw_control.sync.synchronizer import Command, Synchronizer
+from dcdrw_msgs_py.diagnosis import Diagnosis, Level
+
+_MEANINGS: dict[Fault, str] = {
+    'stale': 'phase_state has stopped',
+    'not finite': 'phase_state carried a value that is no number, or lacked a wheel',
+    'new run': 'the source of phase_state started anew',
+    'stalled': 'a wheel does not strike any more',
+    'slipped': 'a wheel slipped a step',
+    'second publisher': 'somebody else publishes the command as well',
+    'clock': 'the clock went back',
+}
+
+
+def diagnose_synchronizer(core: Synchronizer, command: Command, age: float) -> Diagnosis:
+    """The synchronizer's diagnosis; `age` of its last sample [s], NaN where there was none."""
+    reason = core.safety.reason
+    level, message = Level.OK, command.state.value
+    if reason:
+        level, message = Level.ERROR, f'fault: {_MEANINGS[reason]}; ~/reset_fault, then renew enable'
+    elif core.params.law == 'off' and command.state is not State.DISABLED:
+        level, message = Level.WARN, 'enabled, but the parameter law is off'
+    return Diagnosis(
+        level,
+        message,
+        {
+            'state': command.state.value,
+            'fault': reason or 'none',
+            'force [N]': f'{command.force:.6g}',
+            'work [J]': f'{core.work:.6g}',
+            'messages refused': str(core.refused),
+            'age of the last sample [s]': f'{age:.6g}' if math.isfinite(age) else 'nan',
+        },
+    )

@@ -1,0 +1,168 @@
+"""The synchronizer: laws and safety put together. Plain data in, the command out; no clock of its own."""
+
+import math
+from typing import Annotated, Literal, NamedTuple, get_args
+
+from dcdrw_control.sync.hold import HoldGains, HoldLaw
+from dcdrw_control.sync.safety import Fault, Limits, Safety, State
+from dcdrw_msgs_py.quantity import Quantity
+from dcdrw_msgs_py.rig import StanceDistance, WheelShape
+from dcdrw_msgs_py.samples import PhaseSample
+
+LawName = Literal['off', 'hold']
+LAWS: tuple[LawName, ...] = get_args(LawName)
+MOST_STEPS_APART = 1
+"""|n| beyond this is a slipped step."""
+
+
+class SynchronizerParams(NamedTuple):
+    """The rig as the synchronizer needs it, its law, its limits and its patience."""
+
+    law: Annotated[str, Quantity(f'what computes the force: {", ".join(LAWS)}')] = 'off'
+    hold: HoldGains = HoldGains()
+    front: WheelShape = WheelShape()
+    rear: WheelShape = WheelShape()
+    S0: StanceDistance = math.nan
+    limits: Limits = Limits()
+    rate: Annotated[float, Quantity('commands per second', 'Hz', low=50.0, high=2000.0)] = 500.0
+    stale_after: Annotated[
+        float, Quantity('without a sample for this long the input is stale: a fault', 's', above=0.0, high=0.08)
+    ] = 0.07
+    enable_timeout: Annotated[
+        float, Quantity('an enable that is not renewed for this long counts as false', 's', above=0.0, high=1.0)
+    ] = 0.15
+    stall_after: Annotated[
+        float, Quantity('a wheel without a strike for this long has stalled: a fault', 's', above=0.0, high=10.0)
+    ] = 2.0
+
+    def check_law(self) -> None:
+        """Refuse a law that does not exist or has no gains.
+
+        Raises:
+            ValueError: the parameter is named.
+
+        """
+        if self.law not in LAWS:
+            raise ValueError(f'law must be one of {", ".join(LAWS)}, got {self.law!r}')
+        if self.law == 'hold':
+            self.hold.check_sizes()
+
+
+class Command(NamedTuple):
+    """What is commanded at one instant."""
+
+    force: float
+    """[N], tension positive."""
+    state: State
+    stamp_ns: int
+    """Of the sample that it came from; 0 where there was none."""
+
+
+class Synchronizer:
+    """Takes samples and heartbeats as they come, and gives a command whenever it is asked.
+
+    Times `now` are a steady clock's [s].
+    """
+
+    _last: PhaseSample | None
+    _heard: float
+    _asked: float
+    _struck: list[float]
+
+    def __init__(self, params: SynchronizerParams) -> None:
+        self.params = params
+        self.safety = Safety(params.limits)
+        self._law = HoldLaw(params.hold, params.front.alpha, params.rear.alpha)
+        self._heartbeat = -math.inf
+        self._forget()
+        self.refused = 0
+        """Messages that could not be read, or that had no place."""
+        self.work = 0.0
+        """Work on the pair so far, ∫ |F Ḋ| dt [J]."""
+
+    def configure(self, params: SynchronizerParams) -> None:
+        """Take changed limits at once."""
+        self.params = params
+        self.safety.limits = params.limits
+
+    def enable(self, now: float, on: bool) -> None:
+        """Take a heartbeat; false ends it at once."""
+        self._heartbeat = now if on else -math.inf
+
+    def refuse(self) -> None:
+        """A message was no sample: a wheel is missing, or a value is no number."""
+        self.refused += 1
+        self.safety.trip('not finite')
+
+    def conflict(self, fault: Fault) -> None:
+        """The node saw what no sample tells: another publisher, or a clock that went back."""
+        self.safety.trip(fault)
+
+    def update(self, sample: PhaseSample, now: float) -> None:
+        """Take the next sample."""
+        values = (*sample.front, *sample.rear)
+        if not all(map(math.isfinite, values)):
+            self.refuse()
+            return
+        last = self._last
+        if last and sample.restarts != last.restarts:
+            self.safety.trip('new run')
+            self._forget()
+        elif last and sample.stamp_ns < last.stamp_ns:
+            self.safety.trip('clock')
+            self._forget()
+        elif last and sample.stamp_ns == last.stamp_ns:
+            self.refused += 1
+            return
+        if abs(sample.step_difference) > MOST_STEPS_APART:
+            self.safety.trip('slipped')
+        for i, (turn, wheel) in enumerate(((sample.front, self.params.front), (sample.rear, self.params.rear))):
+            before = (last.front, last.rear)[i] if last else turn
+            if abs(turn.angle - before.angle) > wheel.alpha or not math.isfinite(self._struck[i]):
+                self._struck[i] = now
+        self._law.update(sample, self.safety.force)
+        self._last, self._heard = sample, now
+
+    def command(self, now: float) -> Command:
+        """The command at a time."""
+        if now - self._heard > self.params.stale_after:
+            self.safety.trip('stale')
+        if now - min(self._struck) > self.params.stall_after:
+            self.safety.trip('stalled')
+        ready = (
+            self.params.law != 'off'
+            and now - self._heard <= self.params.stale_after
+            and now - min(self._struck) <= self.params.stall_after
+            and math.isfinite(self._law.force)
+            and self._last is not None
+            and abs(self._last.step_difference) <= MOST_STEPS_APART
+        )
+        state = self.safety.update(now, now - self._heartbeat <= self.params.enable_timeout, ready)
+        rate = self._coupler_rate()
+        force = self.safety.command(now, self._law.force, rate)
+        if math.isfinite(self._asked) and math.isfinite(rate):
+            self.work += abs(force * rate) * (now - self._asked)
+        self._asked = now
+        return Command(force, state, self._last.stamp_ns if self._last else 0)
+
+    def _forget(self) -> None:
+        """Know nothing of the input any more."""
+        self._last = None
+        self._heard = -math.inf
+        self._asked = math.nan
+        self._struck = [-math.inf, -math.inf]
+        self._law.reset()
+
+    def _coupler_rate(self) -> float:
+        """Ḋ [m/s] from stance angles and speeds; NaN where it is unknown (contract §1)."""
+        if self._last is None:
+            return math.nan
+        (theta1, omega1), (theta2, omega2) = self._last.front, self._last.rear
+        front, rear = self.params.front, self.params.rear
+        S0 = front.length if math.isnan(self.params.S0) else self.params.S0
+        S = S0 + self._last.step_difference * front.step_length
+        x = front.length * math.sin(theta1) - rear.length * math.sin(theta2) + S
+        y = front.length * math.cos(theta1) - rear.length * math.cos(theta2)
+        x_rate = front.length * math.cos(theta1) * omega1 - rear.length * math.cos(theta2) * omega2
+        y_rate = rear.length * math.sin(theta2) * omega2 - front.length * math.sin(theta1) * omega1
+        return (x * x_rate + y * y_rate) / max(math.hypot(x, y), 1e-9)

@@ -1,0 +1,211 @@
+"""A force held from strike to strike of the front wheel: its gain from the return map, and how far the loop is stable.
+
+About a limit cycle a step answers a held force u as x⁺ = A x + B u, x the deviation of [θ1′, θ2, θ2′] at the section.
+A force that comes late by d acts as B_old u_before + B_new u: the one before still acts for the first d of the step.
+The law is u = u* − K x − κ (u_before − u*).
+"""
+
+import math
+from collections.abc import Callable
+from typing import Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
+from scipy.linalg import solve_discrete_are
+from scipy.optimize import brentq
+
+from dcdrw_msgs_py.rig import RigParams
+from dcdrw_sim.map.return_map import Complexes, FixedPoint, ReturnMap, SectionState, spectrum
+from dcdrw_sim.map.variation import jump, propagators, rates
+from dcdrw_sim.model.dynamics import State
+from dcdrw_sim.motion.pair import Segment
+from dcdrw_sim.motion.trajectory import run
+
+Floats = NDArray[np.float64]
+Target = Literal['cycle', 'time', 'angle']
+TARGETS: tuple[Target, ...] = get_args(Target)
+"""cycle: the pair's own limit cycle, where no force is left; time: the rear wheel strikes when half of the front
+wheel's step time has passed; angle: p = 50 % at the strikes of the front wheel."""
+Method = Literal['deadbeat', 'lqr']
+METHODS: tuple[Method, ...] = get_args(Method)
+
+MOST_GAIN = 20.0
+"""Where the search for an unstable gain ends, in gains of the law."""
+LOOKS = 40
+"""Gains and delays that are looked at on the way; between two of them the edge is found exactly."""
+WHOLE_STEP = 0.999
+"""Delays are looked at up to this fraction of a step's time; a longer one would be that of another step."""
+
+
+class Plant(NamedTuple):
+    """How a step answers a force about a limit cycle."""
+
+    rig: RigParams
+    point: FixedPoint
+    """The limit cycle under the steady force."""
+    force: float
+    """u*, the steady force that the target needs [N]."""
+    delay: float
+    """d [s]."""
+    by_old: Floats
+    """B_old, shape (3,) [per N]."""
+    by_new: Floats
+    """B_new, shape (3,) [per N]."""
+
+    def closed(self, law: 'Law', factor: float = 1.0) -> Complexes:
+        """Multipliers of the loop with so many times the gain of a law, the largest first, shape (4,)."""
+        gain = factor * np.append(law.gain, law.gain_before)
+        step = np.column_stack([self.point.derivative, self.by_old]) - np.outer(self.by_new, gain)
+        return spectrum(np.vstack([step, -gain]))
+
+
+class Law(NamedTuple):
+    """A force from the state x at a strike: u = force − gain · (x − state) − gain_before (u_before − force)."""
+
+    state: SectionState
+    """What is aimed at."""
+    force: float
+    """[N]"""
+    gain: Floats
+    """By θ1′ [N·s/rad], θ2 [N/rad] and θ2′ [N·s/rad], shape (3,)."""
+    gain_before: float
+    """By the force that was held before."""
+
+
+class Margins(NamedTuple):
+    """Where the loop becomes unstable; infinite where it does not within what is searched."""
+
+    gain: float
+    """Times the gain of the law; at most `MOST_GAIN` is looked at."""
+    delay: float
+    """[s]; at most a step's time is looked at."""
+
+
+def plant(rig: RigParams, target: Target = 'cycle', delay: float = 0.0, limit: float = math.inf) -> Plant:
+    """The step about the limit cycle that has the target.
+
+    Args:
+        rig: the rig.
+        target: what counts as in step.
+        delay: between a strike and the force that answers it [s].
+        limit: largest steady force that may be needed [N].
+
+    Raises:
+        ValueError: the pair has no limit cycle, none with this target within the limit, or the delay is
+            longer than a step.
+
+    """
+    point, force = _target(rig, target, limit)
+    return _with_delay(rig, point, force, delay)
+
+
+def law(plant: Plant, method: Method = 'deadbeat', band: float = 0.06, limit: float = 20.0) -> Law:
+    """The law of a plant.
+
+    Args:
+        plant: as `plant` gives it.
+        method: deadbeat brings θ2 to its aim in one step; lqr weighs θ2 in bands against the force in limits
+            (Bryson's rule), for every step to come.
+        band: what counts as a large error, in steps.
+        limit: what counts as a large force [N].
+
+    Raises:
+        ValueError: a held force does not move θ2 at all.
+
+    """
+    derivative, by_old, by_new = plant.point.derivative, plant.by_old, plant.by_new
+    if not abs(by_new[1]) > 0.0:
+        raise ValueError('a force in the coupler does not move the rear wheel at the strikes of the front one')
+    if method == 'deadbeat':
+        gain = np.append(derivative[1], by_old[1]) / by_new[1]
+    else:
+        # The state with the force before, which the delay needs.
+        A = np.vstack([np.column_stack([derivative, by_old]), np.zeros(4)])
+        B = np.append(by_new, 1.0)[:, None]
+        Q = np.diag([0.0, 1.0 / (2.0 * band * plant.rig.rear.alpha) ** 2, 0.0, 0.0])
+        R = np.array([[1.0 / limit**2]])
+        P = solve_discrete_are(A, B, Q, R)
+        gain = np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A)[0]
+    return Law(plant.point.state, plant.force, gain[:3], float(gain[3]))
+
+
+def margins(plant: Plant, chosen: Law) -> Margins:
+    """How much more gain, or how much delay in all, makes the loop unstable."""
+
+    def radius_of_gain(factor: float) -> float:
+        return float(abs(plant.closed(chosen, factor)[0])) - 1.0
+
+    def radius_of_delay(delay: float) -> float:
+        return float(abs(_with_delay(plant.rig, plant.point, plant.force, delay).closed(chosen)[0])) - 1.0
+
+    return Margins(
+        _first_unstable(radius_of_gain, 1.0, MOST_GAIN),
+        _first_unstable(radius_of_delay, plant.delay, WHOLE_STEP * plant.point.period),
+    )
+
+
+def _first_unstable(radius: Callable[[float], float], low: float, high: float) -> float:
+    grid = np.linspace(low, high, LOOKS)
+    values = [radius(value) for value in grid]
+    for i in range(1, len(grid)):
+        if values[i - 1] < 0.0 <= values[i]:
+            return float(brentq(radius, grid[i - 1], grid[i]))
+    return low if values[0] >= 0.0 else math.inf
+
+
+def _target(rig: RigParams, target: Target, limit: float) -> tuple[FixedPoint, float]:
+    own = ReturnMap(rig).fixed_point()
+    if target == 'cycle':
+        return own, 0.0
+
+    def miss(force: float) -> float:
+        point = ReturnMap(rig, force).fixed_point(own.state)
+        if target == 'angle':
+            return float(point.state.theta2)
+        motion = run(rig, State(rig.front.alpha, *point.state), strikes=3, external_force=force)
+        rear = next(strike.t for strike in motion.strikes if strike.wheel == 2)
+        return float(rear / point.period - 0.5)
+
+    # A force of this size moves θ2 by about its error: search as far on either side as that needs, within the limit.
+    slope = np.linalg.solve(np.eye(3) - own.derivative, own.by_force)[1]
+    reach = min(limit, 4.0 * abs(own.state.theta2 / slope) + 1e-6)
+    try:
+        force = float(brentq(miss, -reach, reach, xtol=1e-9))
+    except ValueError as error:
+        raise ValueError(f'no steady force within ±{reach:.3g} N gives the target {target!r}: {error}') from None
+    return ReturnMap(rig, force).fixed_point(own.state), force
+
+
+def _with_delay(rig: RigParams, point: FixedPoint, force: float, delay: float) -> Plant:
+    if not 0.0 <= delay < point.period:
+        raise ValueError(f'the delay must be ≥ 0 and shorter than a step, {point.period:.3f} s, got {delay:g} s')
+    if delay == 0.0:
+        return Plant(rig, point, force, 0.0, np.zeros(3), point.by_force)
+    rig = ReturnMap(rig).rig
+    motion = run(rig, State(rig.front.alpha, *point.state), strikes=3, external_force=force)
+    segments = _cut(motion.segments, delay)
+    steps = propagators(rig, segments, force)
+    deviation = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
+    for i, step in enumerate(steps):
+        if i:
+            deviation = jump(rig, segments[i - 1], segments[i], force) @ deviation
+        if segments[i].start >= delay:
+            deviation[4] = 0.0
+        deviation = step @ deviation
+    flow = rates(rig, motion.strikes[-1].state, rig.S0, force)
+    by_old = (deviation - flow / flow[0] * deviation[0])[1:4]
+    return Plant(rig, point, force, delay, by_old, point.by_force - by_old)
+
+
+def _cut(segments: list[Segment], time: float) -> list[Segment]:
+    """The same motion, with a segment that begins at a time [s]."""
+    result = []
+    for one in segments:
+        if one.start < time < one.end:
+            shift = Polynomial([time - one.start, 1.0])
+            theta1, theta2 = (np.asarray(Polynomial(theta)(shift).coef, float) for theta in (one.theta1, one.theta2))
+            result += [one._replace(end=time), Segment(time, one.end, theta1, theta2, one.steps)]
+        else:
+            result.append(one)
+    return result

@@ -1,0 +1,136 @@
+"""The law `hold` on the pair itself: the paper's coupler, judged at strikes and at every instant."""
+
+import math
+
+import pytest
+
+from dcdrw_control.sync.hold import HoldGains
+from dcdrw_control.sync.safety import State
+from dcdrw_control.sync.synchronizer import Synchronizer, SynchronizerParams
+from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.samples import JointSample, PhaseSample, Turn
+from dcdrw_sim.map.holding import law, plant
+from dcdrw_sim.model.presets import preset
+from dcdrw_sim.model.start import start
+from dcdrw_sim.motion.pair import Simulation
+from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams
+
+PAPER = preset('paper')
+RATE = 500.0
+
+
+def params_for(rig: RigParams, name: str = 'hold') -> SynchronizerParams:
+    found = law(plant(rig))
+    gains = HoldGains(tuple(map(float, found.state)), tuple(map(float, found.gain)), found.force, found.gain_before)
+    return SynchronizerParams(law=name, hold=gains)
+
+
+HOLD = params_for(PAPER)
+
+
+def walk(rig: RigParams, params: SynchronizerParams, phase: float, seconds: float, core: Synchronizer | None = None):
+    """Let a synchronizer act on the pair: (strikes of the front wheel, 100 (p − 0.5), force, Ḋ, state) per sample."""
+    begun = start(rig, phase)
+    pair, estimator, core = Simulation(*begun), PhaseEstimator(PhaseParams()), core or Synchronizer(params)
+    strikes = 0
+    for tick in range(round(seconds * RATE)):
+        t = tick / RATE
+        motion = pair.advance_to(t)
+        strikes += sum(strike.wheel == 1 for strike in motion.strikes)
+        joints = JointSample(
+            round(t * 1e9) + 1, Turn(motion.rotation1, motion.omega1), Turn(motion.rotation2, motion.omega2)
+        )
+        core.update(estimator.update(joints).phase, t)
+        core.enable(t, True)
+        command = core.command(t)
+        turned1, turned2 = motion.rotation1 / (2 * rig.front.alpha), motion.rotation2 / (2 * rig.rear.alpha)
+        yield strikes, 100.0 * ((turned1 - turned2) % 1.0 - 0.5), pair.external_force, motion.rate, command.state
+        if command.force != pair.external_force:
+            pair.external_force = command.force
+
+
+def steps(rows) -> int:
+    return max((strikes + 1 for strikes, error, *_ in rows if abs(error) > 6.0), default=0)
+
+
+@pytest.mark.parametrize('percent', [10, 30, 70, 90])
+def test_hold_brings_the_papers_pair_into_step_within_three_steps_with_little_work(percent):
+    rows = list(walk(PAPER, HOLD, percent / 100.0, 10.0))
+    assert steps(rows) <= 3
+    assert max(abs(force) for _, _, force, _, _ in rows) <= HOLD.limits.max_force
+    work = [abs(force * rate) / RATE for _, _, force, rate, _ in rows]
+    assert sum(work[: round(5.0 * RATE)]) <= 5.0
+    assert sum(work[round(5.0 * RATE) :]) / 5.0 <= 0.05
+
+
+def test_on_its_limit_cycle_the_pair_needs_no_force():
+    rows = list(walk(PAPER, HOLD, 0.48, 25.0))
+    assert max(abs(force) for _, _, force, _, _ in rows[-round(5.0 * RATE) :]) < 0.1
+
+
+def test_with_law_off_it_stays_armed_and_commands_nothing():
+    rows = list(walk(PAPER, params_for(PAPER, 'off'), 0.2, 3.0))
+    assert {force for _, _, force, _, _ in rows} == {0.0}
+    assert {state for *_, state in rows} == {State.ARMED}
+
+
+def pushing() -> tuple[Synchronizer, PhaseSample, float]:
+    """A synchronizer that pushes, with its last sample and time."""
+    core = Synchronizer(HOLD)
+    for *_, force, _, state in walk(PAPER, HOLD, 0.2, 1.2, core):
+        last = force, state
+    assert last[1] is State.ACTIVE
+    assert last[0] != 0.0
+    assert core._last is not None
+    return core, core._last, 1.2
+
+
+@pytest.mark.parametrize(
+    ('change', 'fault'),
+    [
+        ({'front': Turn(math.nan, 1.0)}, 'not finite'),
+        ({'rear': Turn(0.1, math.inf)}, 'not finite'),
+        ({'restarts': 1}, 'new run'),
+        ({'step_difference': 2}, 'slipped'),
+        ({'stamp_ns': 5}, 'clock'),
+    ],
+)
+def test_each_bad_sample_has_its_fault_and_ends_the_force_at_once(change, fault):
+    core, sample, now = pushing()
+    core.update(sample._replace(**{'stamp_ns': sample.stamp_ns + 1_000_000, **change}), now)
+    command = core.command(now)
+    assert (command.force, command.state, core.safety.reason) == (0.0, State.FAULT, fault)
+
+
+def test_silence_is_a_fault_within_100_ms_and_a_wheel_without_strikes_is_one():
+    core, _, now = pushing()
+    core.enable(now + 0.08, True)
+    command = core.command(now + 0.08)
+    assert (command.force, core.safety.reason) == (0.0, 'stale')
+    core, sample, now = pushing()
+    for tick in range(1200):
+        now += 0.002
+        core.update(sample._replace(stamp_ns=sample.stamp_ns + (tick + 1) * 2_000_000), now)
+        core.enable(now, True)
+        command = core.command(now)
+    assert (command.force, core.safety.reason) == (0.0, 'stalled')
+
+
+def test_a_heartbeat_that_ends_ramps_the_force_down():
+    core, sample, now = pushing()
+    core.enable(now, False)
+    forces = []
+    for tick in range(60):
+        now += 0.002
+        core.update(sample._replace(stamp_ns=sample.stamp_ns + (tick + 1) * 2_000_000), now)
+        forces.append(abs(core.command(now).force))
+    assert forces == sorted(forces, reverse=True)
+    assert forces[-11] == 0.0  # after 100 ms
+    assert core.safety.state is State.DISABLED
+
+
+def test_hold_without_gains_is_refused_with_the_mend():
+    with pytest.raises(ValueError, match='dcdrw control'):
+        SynchronizerParams(law='hold').check_law()
+    with pytest.raises(ValueError, match='law must be one of'):
+        SynchronizerParams(law='grip').check_law()
