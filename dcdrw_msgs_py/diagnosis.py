@@ -1,7 +1,39 @@
-"""How a node is, as plain data; what it says of itself on `/diagnostics`."""
+"""How a node is, as plain data; what it says of itself on `/diagnostics`.
 
-from enum import IntEnum
-from typing import NamedTuple
+The message is for people alone. What a program wants to know is a value under a key, and the keys that anybody reads
+are declared here. A value is a bare number whose unit stands in its key, a state, a flag or a name.
+"""
+
+import math
+from collections.abc import Mapping
+from enum import Enum, IntEnum
+from typing import NamedTuple, TypeVar
+
+State = TypeVar('State', bound=Enum)
+Value = str | float | bool | Enum
+
+STATE = 'state'
+"""Of `sync_monitor` a `PairState`, of the simulator a `SourceState`, of the recorder a `RecorderState`."""
+PHASE, PHASE_OF_STRIDE = 'phase [%]', 'phase of a stride [%]'
+ERROR, ERROR_DEG = 'error [%]', 'error [deg]'
+LOWEST_ERROR, HIGHEST_ERROR = 'lowest error within the last step [%]', 'highest error within the last step [%]'
+STEP_DIFFERENCE = 'n'
+STEPS = 'steps'
+STEPS_TO_SYNCHRONIZATION = 'steps to synchronization'
+CONTRACTION = 'per-step convergence ratio'
+RATE_IN, AGE = 'rate in [Hz]', 'age of the last sample [s]'
+GAPS, LOST_SAMPLES, LONGEST_GAP = 'gaps', 'samples lost', 'longest gap [s]'
+RESTARTS = 'restarts of the source'
+
+
+def messages_of(topic: str) -> str:
+    """The recorder's key for how many messages of a topic it has; absent where it does not listen to the topic."""
+    return f'messages of {topic}'
+
+
+def parameters_of(node: str) -> str:
+    """The recorder's key for whether it has the parameters of a node."""
+    return f'parameters of {node}'
 
 
 class Level(IntEnum):
@@ -13,9 +45,82 @@ class Level(IntEnum):
     STALE = 3
 
 
+class PairState(str, Enum):
+    """What the pair does; where several hold, the first of them counts."""
+
+    NO_DATA = 'no_data'
+    """No sample has come, or none for a while."""
+    HELD = 'held'
+    """The wheels are held: paused, or not yet let go."""
+    STALLED = 'stalled'
+    """A wheel does not strike any more."""
+    SLIPPED = 'slipped'
+    """A wheel has just struck twice in a row."""
+    LOST = 'lost'
+    """The pair was in step, and is no more."""
+    SYNCHRONIZED = 'synchronized'
+    CONVERGING = 'converging'
+
+    @property
+    def word(self) -> str:
+        """As people read it."""
+        return self.value.replace('_', ' ').upper()
+
+
+class SourceState(str, Enum):
+    """What a simulated rig does."""
+
+    FAILED = 'failed'
+    """It cannot go on until it is reset."""
+    PAUSED = 'paused'
+    STANDING = 'standing'
+    """A wheel stands still on two spokes."""
+    RUNNING = 'running'
+
+
+class RecorderState(str, Enum):
+    """What the recorder does."""
+
+    FAILED = 'failed'
+    """The last recording ended before it was told to."""
+    RECORDING = 'recording'
+    IDLE = 'idle'
+
+
 class Diagnosis(NamedTuple):
     """One status: how bad, what it is, and the figures behind it."""
 
     level: Level
     message: str
-    values: dict[str, str]
+    """For people; no program depends on its words."""
+    values: Mapping[str, Value]
+    """As they are; read back from `/diagnostics`, as text."""
+
+    def state(self, kind: type[State]) -> State | None:
+        """The state that the node is in; None where it says none of this kind."""
+        try:
+            return kind(self.values.get(STATE))
+        except ValueError:
+            return None
+
+    def number(self, key: str) -> float:
+        """The number under a key; NaN where there is none."""
+        try:
+            return float(self.values.get(key, math.nan))  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            return math.nan
+
+    def flag(self, key: str) -> bool:
+        """Whether the value under a key is true."""
+        return value_text(self.values.get(key, False)) == 'true'
+
+
+def value_text(value: Value) -> str:
+    """A value as `/diagnostics` carries it: what is not known is `nan`, so that every number reads as one."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, Enum):
+        return str(value.value)
+    if isinstance(value, float):
+        return f'{value:.6g}' if math.isfinite(value) else 'nan'
+    return str(value)

@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PointStamped
 from sensor_msgs.msg import JointState
 
-from dcdrw_msgs_py.diagnosis import Diagnosis
+from dcdrw_msgs_py.diagnosis import Diagnosis, Level, value_text
 from dcdrw_msgs_py.samples import RUN, SECOND, CouplerSample, Footfall, JointSample, PhaseSample, Turn, run_of
 from dcdrw_msgs_py.topics import (
     COUPLER,
@@ -22,8 +22,8 @@ from dcdrw_msgs_py.topics import (
     STEP_DIFFERENCE_JOINT,
 )
 
-# Foxglove and PlotJuggler group diagnostics by their hardware's name.
 SUITE = 'dcdrw'
+"""The rig without a namespace, as diagnostics name their hardware; viewers group by it."""
 
 
 def stamp_ns(stamp: Any) -> int:
@@ -188,12 +188,39 @@ def footfall(message: Any) -> Footfall:
     return Footfall(message.header.frame_id, stamp_ns(message.header.stamp), message.point.x, round(message.point.z))
 
 
-def diagnostics_message(name: str, diagnosis: Diagnosis, now_ns: int) -> Any:
-    """One node's diagnosis as `/diagnostics` carries it."""
-    values = [KeyValue(key=key, value=value) for key, value in diagnosis.values.items()]
-    status = DiagnosticStatus(
-        level=bytes([diagnosis.level]), name=name, message=diagnosis.message, hardware_id=SUITE, values=values
+def diagnostics_message(node: str, diagnosis: Diagnosis, now_ns: int) -> Any:
+    """One node's diagnosis as `/diagnostics` carries it; the hardware is the rig, which the namespace tells.
+
+    Args:
+        node: its full name, namespace first.
+        diagnosis: what it says.
+        now_ns: the stamp.
+
+    """
+    name = node.lstrip('/')
+    namespace = name.rpartition('/')[0]
+    message = DiagnosticArray(
+        status=[
+            DiagnosticStatus(
+                level=bytes([diagnosis.level]),
+                name=name,
+                message=diagnosis.message,
+                hardware_id=f'{SUITE}/{namespace}' if namespace else SUITE,
+                values=[KeyValue(key=key, value=value_text(value)) for key, value in diagnosis.values.items()],
+            )
+        ]
     )
-    message = DiagnosticArray(status=[status])
     message.header.stamp = to_stamp(now_ns)
     return message
+
+
+def diagnoses(message: Any) -> dict[str, Diagnosis]:
+    """What the nodes say of themselves in a message of `/diagnostics`, by their names, namespaces included."""
+    return {
+        status.name: Diagnosis(
+            Level(min(status.level[0], Level.STALE)),
+            status.message,
+            {pair.key: pair.value for pair in status.values},
+        )
+        for status in message.status
+    }

@@ -197,25 +197,30 @@ def dropped(node: Node) -> dict[str, int]:
     return {name: box.dropped for name, box in inboxes.items() if isinstance(box, Inbox) and box.dropped}
 
 
-def report(node: Node, diagnose: Callable[[], Diagnosis]) -> None:
-    """Publish a node's diagnosis once a second, by a clock that goes on where simulated time stands still."""
-    publisher = advertise(node, DIAGNOSTICS)
-    name = node.get_fully_qualified_name().lstrip('/')
+def report(node: Node, diagnose: Callable[[], Diagnosis]) -> Callable[[], None]:
+    """Publish a node's diagnosis once a second, by a clock that goes on where simulated time stands still.
 
+    Returns:
+        publishes it at once: to be called when the node's state has changed.
+
+    """
+    publisher = advertise(node, DIAGNOSTICS)
     told: dict[str, int] = {}
 
     def publish() -> None:
         diagnosis, lost = diagnose(), dropped(node)
-        if lost:
-            diagnosis.values.update({f'messages dropped: {topic}': str(count) for topic, count in lost.items()})
+        values = {**diagnosis.values, **{f'messages dropped of {topic}': count for topic, count in lost.items()}}
+        level, message = diagnosis.level, diagnosis.message
         if lost != told:
             news = ', '.join(f'{count - told.get(topic, 0)} of {topic}' for topic, count in lost.items())
-            message = f'overloaded: dropped {news} within a second; {diagnosis.message}'
-            diagnosis = diagnosis._replace(level=max(diagnosis.level, Level.WARN), message=message)
+            level, message = max(level, Level.WARN), f'overloaded: dropped {news} within a second; {message}'
             told.update(lost)
-        publisher.publish(diagnostics_message(name, diagnosis, node.get_clock().now().nanoseconds))
+        now_ns = node.get_clock().now().nanoseconds
+        name = node.get_fully_qualified_name()
+        publisher.publish(diagnostics_message(name, Diagnosis(level, message, values), now_ns))
 
     node.create_timer(1.0, publish, clock=steady_clock())
+    return publish
 
 
 def steady_clock() -> Clock:

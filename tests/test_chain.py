@@ -1,12 +1,14 @@
 """The whole chain in three processes."""
 
 import signal
+from functools import partial
 from itertools import pairwise
 
 import pytest
 from std_srvs.srv import SetBool
 
-from dcdrw_msgs_py.messages import PhaseSampleReader
+from dcdrw_msgs_py.diagnosis import PairState, SourceState
+from dcdrw_msgs_py.messages import PhaseSampleReader, diagnoses
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, PHASE_STATE, SYNC_ERROR_PERCENT, SYNCHRONIZED
 from dcdrw_sim.motion.trajectory import run
@@ -25,9 +27,10 @@ def start_chain(bench: Bench):
     return bench.start('simulator', paused=True, **STIFF)
 
 
-def monitor_says(diagnostics) -> tuple[int, str]:
-    said = [m.status[0] for m in diagnostics if m.status[0].name == 'sync_monitor']
-    return (said[-1].level[0], said[-1].message) if said else (-1, '')
+def state_of(diagnostics, name: str, kind):
+    """What a node said last that it, or the pair, does."""
+    said = [diagnosis for message in diagnostics if (diagnosis := diagnoses(message).get(name))]
+    return said[-1].state(kind) if said else None
 
 
 def let_go(bench: Bench) -> None:
@@ -69,21 +72,22 @@ def test_estimate_is_the_truth_of_the_simulation(bench):
 def test_killed_simulator_is_stale_and_a_new_one_is_judged_afresh(bench):
     verdicts, diagnostics = bench.hear(SYNCHRONIZED), bench.hear(DIAGNOSTICS)
     errors = bench.hear(SYNC_ERROR_PERCENT)
+    pair = partial(state_of, diagnostics, 'sync_monitor', PairState)
     simulator = start_chain(bench)
     bench.wait(lambda: errors, 'an error at the end of the chain')
     let_go(bench)
     bench.wait(lambda: verdicts and verdicts[-1].data, 'synchronized')
-    bench.wait(lambda: monitor_says(diagnostics)[1].startswith('synchronized after'), 'a diagnosis that says so')
+    bench.wait(lambda: pair() is PairState.SYNCHRONIZED, 'a diagnosis that says so')
 
     simulator.send_signal(signal.SIGKILL)
     simulator.wait(10)
     bench.wait(lambda: not verdicts[-1].data, 'the end of the verdict')
-    bench.wait(lambda: monitor_says(diagnostics)[0] == 3, 'STALE')
+    bench.wait(lambda: pair() is PairState.NO_DATA, 'no data')
 
     count = len(errors)
     bench.start('simulator', k=60.0, initial_phase_percent=20.0, rate=200.0)
     bench.wait(lambda: len(errors) > count + 100, 'errors of the new run')
-    bench.wait(lambda: monitor_says(diagnostics)[0] == 0, 'a monitor that has recovered')
+    bench.wait(lambda: pair() is PairState.CONVERGING, 'a monitor that has recovered')
     claimed = []
 
     def again():
@@ -93,6 +97,28 @@ def test_killed_simulator_is_stale_and_a_new_one_is_judged_afresh(bench):
 
     bench.wait(again, 'synchronized again')
     assert abs(claimed[0]) < 8.0  # never claimed while the error, which starts at −30 %, is outside the band
+
+
+def test_wheels_are_held_before_they_are_let_go_and_while_they_are_paused_but_never_stalled(bench):
+    diagnostics = bench.hear(DIAGNOSTICS)
+    pair = partial(state_of, diagnostics, 'sync_monitor', PairState)
+    rig = partial(state_of, diagnostics, 'simulator', SourceState)
+    for name in ('sync_monitor', 'phase_estimator'):
+        bench.start(name, **({'stall_after': 2.0} if name == 'sync_monitor' else {}))
+    bench.start('simulator', paused=True, **STIFF)
+    bench.wait(lambda: pair() is PairState.HELD, 'wheels that are held')
+    bench.wait(lambda: rig() is SourceState.PAUSED, 'a simulator that says so')
+    let_go(bench)
+    bench.wait(lambda: pair() is PairState.SYNCHRONIZED, 'synchronized')
+    bench.wait(lambda: rig() is SourceState.RUNNING, 'a simulator that says so')
+    assert bench.call(SetBool, '/simulator/pause', SetBool.Request(data=True)).success
+    bench.wait(lambda: pair() is PairState.HELD, 'wheels that are held again')
+    seconds = len(diagnostics)
+    bench.wait(lambda: len(diagnostics) > seconds + 9, 'three seconds of three nodes')
+    let_go(bench)
+    bench.wait(lambda: pair() is PairState.SYNCHRONIZED, 'synchronized, as before the pause')
+    said = [diagnosis for message in diagnostics if (diagnosis := diagnoses(message).get('sync_monitor'))]
+    assert PairState.STALLED not in [diagnosis.state(PairState) for diagnosis in said]
 
 
 def test_chain_follows_simulated_time_at_another_pace(bench):

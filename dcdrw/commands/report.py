@@ -5,10 +5,9 @@ import csv
 import sys
 from pathlib import Path
 
-from dcdrw.trials.day import STEP_COLUMNS, TRIAL_COLUMNS, Trial, new_name, open_trial, step_rows, table
+from dcdrw.trials.day import STEP_COLUMNS, TRIAL_COLUMNS, RecordedTrial, new_name, open_trial, step_rows, table
 from dcdrw.trials.report_page import page
 from dcdrw.trials.results import SAMPLES_HEADER
-from dcdrw.trials.summary import sentence
 from dcdrw_msgs_py.topics import JOINT_STATES
 
 _EPILOG = """\
@@ -48,11 +47,11 @@ def run(options: argparse.Namespace) -> int:
     for path in (options.out, tables):
         if path.exists():
             raise ValueError(f'{path} exists already, not overwriting; choose another --out')
-    trials: list[Trial] = []
+    trials: list[RecordedTrial] = []
     for path in options.recordings:
         try:
             trials.append(open_trial(path, new_name(path, trials), options.rig, options.topic))
-            print(f'{trials[-1].name}: {sentence(trials[-1].analysis)}')
+            print(f'{trials[-1].name}: {trials[-1].summary.sentence}')
         except (ValueError, OSError) as error:  # the other trials of the day are worth their page
             print(f'dcdrw report: left out: {error}', file=sys.stderr)
     if not trials:

@@ -19,6 +19,7 @@ from dcdrw.trials.filmed_rig import filmed_rig
 from dcdrw.trials.results import describe, write_results
 from dcdrw.trials.simulated import Course, SimulatedTrial
 from dcdrw.trials.summary import sentence
+from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.quantity import check
 from dcdrw_msgs_py.rig import FRONT, REAR
@@ -144,11 +145,10 @@ class _Screen:
             return
         self._shown_at = time.monotonic()
         status, strikes = observer.monitor.status(), observer.strikes
-        state = 'SYNCHRONIZED' if observer.synchronized else 'STALLED' if status.stalled else 'CONVERGING'
         self.say(
             f'{observer.seconds:5.1f} s  phase {phase_text(status.phase)}  '
             f'error {status.error_percent:+5.1f} %  n {status.step_difference:+d}  '
-            f'strikes {strikes[FRONT]} + {strikes[REAR]}  {state}'
+            f'strikes {strikes[FRONT]} + {strikes[REAR]}  {(observer.state or PairState.NO_DATA).word}'
         )
 
     def end(self) -> None:
@@ -169,7 +169,7 @@ def _finish(course: Course, folder: Path) -> int:
             folder,
             end=course.end,
             agreement=describe(course.agreements),
-            diagnostics={name: said.message for name, said in course.diagnoses.items()},
+            diagnostics=course.diagnoses,
             **({'truth': truth._asdict()} if truth else {}),
         )
         print(f'Written: {folder}/')

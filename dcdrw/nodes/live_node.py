@@ -15,11 +15,11 @@ from std_srvs.srv import SetBool, Trigger
 from dcdrw.page.live_state import FRAME_RATE, Command, LiveState
 from dcdrw.suite.executables import PHASE_ESTIMATOR, RECORDER, SIMULATOR, SYNC_MONITOR
 from dcdrw.suite.parameter_file import TrialParams
-from dcdrw_msgs_py.messages import JointSampleReader, PhaseSampleReader, footfall
+from dcdrw_msgs_py.messages import JointSampleReader, PhaseSampleReader, diagnoses, footfall
 from dcdrw_msgs_py.node import listen, steady_clock
 from dcdrw_msgs_py.quantity import build, fields
 from dcdrw_msgs_py.rig import RigParams
-from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, JOINT_STATES, PHASE_STATE, SYNCHRONIZED
+from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, JOINT_STATES, PHASE_STATE
 from dcdrw_tracker.gait.phase import PhaseParams
 from dcdrw_tracker.gait.sync import SyncParams
 
@@ -147,7 +147,6 @@ class LiveNode(Node):
             (JOINT_STATES, self._on_joints),
             (PHASE_STATE, self._on_phase),
             (FOOTFALLS, lambda message: self._state.take_footfall(footfall(message))),
-            (SYNCHRONIZED, lambda message: self._state.take_verdict(message.data)),
             (DIAGNOSTICS, self._on_diagnostics),
         ):
             listen(self, topic, _bearing(take))
@@ -178,10 +177,9 @@ class LiveNode(Node):
         self._state.take_phase(self._phase_reader.read(message), time.monotonic())
 
     def _on_diagnostics(self, message: Any) -> None:
-        for status in message.status:
-            if status.name.startswith(self._prefix):
-                name = status.name.removeprefix(self._prefix)
-                self._state.take_health(name, min(status.level[0], 3), status.message, time.monotonic())
+        for name, said in diagnoses(message).items():
+            if name.startswith(self._prefix):
+                self._state.take_health(name.removeprefix(self._prefix), said, time.monotonic())
 
     def _ask(self) -> None:
         for parameters in (self._simulator, *self._others):
@@ -203,21 +201,16 @@ class LiveNode(Node):
         elif command.do == 'reset':
             self._reset.call(Trigger.Request(), self._answered)
         elif command.do == 'pause':
-            self._pause.call(
-                SetBool.Request(data=command.value), lambda answer: self._switched(answer, paused=command.value)
-            )
+            self._pause.call(SetBool.Request(data=command.value), self._let_go)
         else:
-            self._record.call(
-                SetBool.Request(data=command.value), lambda answer: self._switched(answer, recording=command.value)
-            )
+            self._record.call(SetBool.Request(data=command.value), self._answered)
 
     def _told(self, reason: str) -> None:
         if reason:
             self._state.notice(f'not set: {reason}', ok=False)
 
-    def _switched(self, answer: Any, **switch: Any) -> None:
+    def _let_go(self, answer: Any) -> None:
         if answer and answer.success:
-            self._state.take_switches(**switch)
             self._held = False
         self._answered(answer)
 

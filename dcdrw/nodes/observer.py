@@ -6,13 +6,14 @@ from typing import Any
 
 from rclpy.node import Node
 
-from dcdrw.trials.analysis import moves
-from dcdrw_msgs_py.diagnosis import Diagnosis, Level
-from dcdrw_msgs_py.messages import PhaseSampleReader, footfall
+from dcdrw.suite.executables import SYNC_MONITOR
+from dcdrw_msgs_py.diagnosis import Diagnosis, PairState
+from dcdrw_msgs_py.messages import PhaseSampleReader, diagnoses, footfall
 from dcdrw_msgs_py.node import Age, listen
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import PhaseSample
-from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, PHASE_STATE, SYNC_ERROR, SYNCHRONIZED
+from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, PHASE_STATE, SYNC_ERROR
+from dcdrw_tracker.gait.rest import moves
 from dcdrw_tracker.gait.sync import SyncMonitor, SyncParams
 
 
@@ -26,8 +27,6 @@ class Observer(Node):
         self.heard: set[str] = set()
         """Topics of which a message has come."""
         self.strikes = {FRONT: 0, REAR: 0}
-        self.synchronized = False
-        """The monitor's verdict."""
         self.moving = False
         """The wheels have been let go."""
         self.diagnoses: dict[str, Diagnosis] = {}
@@ -39,11 +38,16 @@ class Observer(Node):
         for topic, callback in (
             (PHASE_STATE, self._on_phase),
             (SYNC_ERROR, self._on_error),
-            (SYNCHRONIZED, self._on_synchronized),
             (FOOTFALLS, self._on_footfall),
             (DIAGNOSTICS, self._on_diagnostics),
         ):
             listen(self, topic, self._bearing(topic.name, callback))
+
+    @property
+    def state(self) -> PairState | None:
+        """What the pair does, by the monitor's word; None before its first."""
+        said = self.diagnoses.get(SYNC_MONITOR.name)
+        return said.state(PairState) if said else None
 
     @property
     def seconds(self) -> float:
@@ -77,17 +81,9 @@ class Observer(Node):
     def _on_error(self, message: Any) -> None:
         """That it comes is all."""
 
-    def _on_synchronized(self, message: Any) -> None:
-        self.synchronized = message.data
-
     def _on_footfall(self, message: Any) -> None:
         if self.moving:
             self.strikes[footfall(message).wheel] += 1
 
     def _on_diagnostics(self, message: Any) -> None:
-        for status in message.status:
-            self.diagnoses[status.name] = Diagnosis(
-                Level(min(status.level[0], Level.STALE)),
-                status.message,
-                {pair.key: pair.value for pair in status.values},
-            )
+        self.diagnoses |= diagnoses(message)

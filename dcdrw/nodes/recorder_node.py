@@ -24,7 +24,7 @@ from dcdrw.recordings.recorder import (
     write_whole,
 )
 from dcdrw.suite.executables import EXECUTABLES, RECORDED, RECORDER
-from dcdrw_msgs_py.diagnosis import Diagnosis, Level
+from dcdrw_msgs_py.diagnosis import STATE, Diagnosis, Level, RecorderState, messages_of, parameters_of
 from dcdrw_msgs_py.node import Parameters, message_type, report, run, steady_clock
 from dcdrw_msgs_py.quantity import fields
 from dcdrw_msgs_py.topics import SAMPLE_DEPTH, Topic
@@ -59,7 +59,7 @@ class RecorderNode(Node):
             name, _, kind = word.partition(':')
             self._wanted[self.resolve_topic_name(name)] = Topic(name, kind, '')
         self.create_service(SetBool, '~/record', self._on_record)
-        report(self, self._diagnose)
+        self._report = report(self, self._diagnose)
         self.create_timer(LOOK_SECONDS, self._look, clock=steady_clock())
         self.create_timer(FLUSH_SECONDS, self._flush, clock=steady_clock())
         if self._settings.value.record:
@@ -114,6 +114,7 @@ class RecorderNode(Node):
             response.success, response.message = False, str(error)
         if self.recorder:
             response.message = str(self.recorder.folder)
+        self._report()
         return response
 
     def _configure(self, params: RecorderParams) -> None:
@@ -208,21 +209,24 @@ class RecorderNode(Node):
             self.failure = _reason(error, recorder)
             recorder.abort()
             self.end()
+            self._report()
             self.get_logger().error(self.failure)
 
     def _diagnose(self) -> Diagnosis:
         recorder = self.recorder
         if self.failure:
-            return Diagnosis(Level.ERROR, self.failure, {})
+            return Diagnosis(Level.ERROR, self.failure, {STATE: RecorderState.FAILED})
         if recorder is None:
-            return Diagnosis(Level.OK, 'not recording', {})
+            return Diagnosis(Level.OK, 'not recording', {STATE: RecorderState.IDLE})
         return Diagnosis(
             Level.OK,
             f'recording to {recorder.folder}',
             {
-                'size': f'{recorder.size / 1e6:.1f} MB',
-                'parameters of': ', '.join(self._parameters),
-                **{f'messages of {topic}': str(count) for topic, count in recorder.counts.items()},
+                STATE: RecorderState.RECORDING,
+                'folder': str(recorder.folder),
+                'size [MB]': recorder.size / 1e6,
+                **{parameters_of(node): True for node in self._parameters},
+                **{messages_of(topic): count for topic, count in recorder.counts.items()},
             },
         )
 

@@ -11,7 +11,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from dcdrw.drawings.rig_markers import MarkerParams, RigView, Shape, about_y
 from dcdrw_msgs_py.diagnosis import Diagnosis, Level
-from dcdrw_msgs_py.messages import JointSampleReader
+from dcdrw_msgs_py.messages import JointSampleReader, diagnoses
 from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
 from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, RIG_MARKERS
 
@@ -48,10 +48,10 @@ class RigMarkersNode(Node):
         self._message = message
 
     def _on_diagnostics(self, message: Any) -> None:
-        for status in message.status:
-            if status.name == self._monitor:
-                self._says = Diagnosis(Level(min(status.level[0], Level.STALE)), status.message, {})
-                self._says_age.renew()
+        said = diagnoses(message).get(self._monitor)
+        if said:
+            self._says = said
+            self._says_age.renew()
 
     def _configure(self, params: MarkerParams) -> None:
         self._view.params = params
@@ -97,7 +97,7 @@ class RigMarkersNode(Node):
         level, message = Level.OK, 'drawing'
         if age > STALE_AFTER:
             level, message = Level.STALE, f'stale: no sample for {age:.1f} s' if self._drawings else 'no data yet'
-        return Diagnosis(level, message, {'drawings': str(self._drawings), 'runs of the source': str(self._view.runs)})
+        return Diagnosis(level, message, {'drawings': self._drawings, 'runs of the source': self._view.runs})
 
 
 def to_marker(shape: Shape, header: Any) -> Any:

@@ -9,14 +9,18 @@ const SILENT_MS = 1000;  // without news for so long the page no longer knows th
 const DEAD_MS = 4000;  // and after this it connects anew
 const FIRST_WAIT_MS = 250, LONGEST_WAIT_MS = 4000;
 const MOST_POINTS = 4000;  // however fast simulated time runs
+const OLD_SECONDS = 1;  // what is older is greyed
+const LATE_PAGE = 'late_page';  // of this page alone; all other states come from dcdrw live
+const APART = 'M3 4c4 6 12 6 18 7M3 20c4-6 12-6 18-7', CLOCK = 'M12 3a9 9 0 1 0 .01 0M12 7v5l4 3';
 const SIGNS = {
-  'SYNCHRONIZED': 'M3 13l6 6L21 5', 'CONVERGING': 'M3 4c4 6 12 6 18 7M3 20c4-6 12-6 18-7',
-  'STALLED': 'M8 4v16M16 4v16', 'NO DATA': 'M4 4l16 16M20 4L4 20',
+  synchronized: 'M3 13l6 6L21 5', converging: APART, lost: 'M3 7c6 0 12-1 18-4M3 17c6 0 12 1 18 4',
+  slipped: 'M4 18h6v-6h6V6h5', stalled: 'M5 5h14v14H5z', held: 'M8 4v16M16 4v16', no_data: 'M4 4l16 16M20 4L4 20',
+  late_data: CLOCK, [LATE_PAGE]: CLOCK,
 };
 
 const element = (id) => document.getElementById(id);
 let socket = null, wait = FIRST_WAIT_MS, timer = 0, heardAt = -Infinity, scheduled = 0;
-let kept, frame, board, run;
+let kept, frame, frameAt, board, run;
 
 function forget() {
   kept = { phis: [], forces: [], falls: [] };
@@ -69,6 +73,7 @@ function take(news, old) {
     kept = { phis: [], forces: [], falls: [] };
   }
   frame = news;
+  frameAt = performance.now();
   if (news.board) board = news.board;
   for (const [name, list] of Object.entries(kept)) {
     list.push(...(news[name] || []));
@@ -92,43 +97,52 @@ function schedule() {
 }
 
 function draw() {
-  const rig = frame ? frame.rig : null;
   watch();
-  drawRig(rig, board);
+  drawRig(frame && frame.rig, board);
   drawPhi(kept.phis, now(), board);
   drawGait(kept.falls, now());
   drawForce(kept.forces, now());
   drawErrors(board);
-  showFigures(rig);
   if (board) showNodes(board.nodes);
 }
 
-// The state and what may be done, from the last frame or from its absence.
+// The state, its age and what may be done, from the last frame or from its absence.
 function watch() {
   const silence = performance.now() - heardAt;
   if (frame && silence < SILENT_MS) {
     showState(frame.state, frame.detail);
     if (board) showControls(board);
   } else {
-    showState('NO DATA', 'no connection to dcdrw live; trying again …');
+    showState(LATE_PAGE, 'this page hears nothing of dcdrw live; trying again …');
     showControls(board && { ...board, simulated: false, recorder: false });
   }
+  showAge();
+  showFigures(frame && frame.rig);
 }
 
 function showState(state, detail) {
-  if (document.body.dataset.state !== state || element('state').textContent !== state) {
+  if (document.body.dataset.state !== state) {
+    const word = state.replace('_', ' ').toUpperCase();
     document.body.dataset.state = state;
-    element('state').textContent = state;
-    document.title = `${state} – dcdrw live`;
+    element('state').textContent = word;
+    document.title = `${word} – dcdrw live`;
   }
   element('sign').firstElementChild.setAttribute('d', SIGNS[state]);
   if (element('detail').textContent !== detail) element('detail').textContent = detail;
 }
 
+// How old the last sample is that is shown; where it is old, all that follows from it is greyed.
+function showAge() {
+  const age = frame && frame.age !== null ? frame.age + (performance.now() - frameAt) / 1000 : null;
+  const late = document.body.dataset.state === LATE_PAGE;
+  document.body.classList.toggle('old', late || age === null || age > OLD_SECONDS);
+  element('age').textContent = age === null ? '' : `the last sample is ${age.toFixed(age < 10 ? 1 : 0)} s old`;
+}
+
 const signed = (value, digits) => (value < 0 ? '−' : '+') + Math.abs(value).toFixed(digits);
 
 function showFigures(rig) {
-  const known = rig && document.body.dataset.state !== 'NO DATA';
+  const known = Boolean(rig);
   element('error').textContent = known ? `${signed(rig.error_percent, 1)} %` : '–';
   element('phase').textContent = known ? `${rig.phase_percent.toFixed(1)} %` : '–';
   element('stride').textContent = known ? `${(rig.phase_percent / 2).toFixed(1)} % of a stride` : '';

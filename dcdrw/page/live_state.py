@@ -8,12 +8,20 @@ import math
 from collections import deque
 from typing import Any, NamedTuple
 
-from dcdrw.suite.executables import RECORDER, SIMULATOR, SYNC_MONITOR
+from dcdrw.suite.executables import EXECUTABLES, RECORDER, SIMULATOR, SYNC_MONITOR
 from dcdrw.suite.parameter_file import TrialParams
-from dcdrw_msgs_py.diagnosis import Level
+from dcdrw_msgs_py.diagnosis import (
+    Diagnosis,
+    Level,
+    PairState,
+    RecorderState,
+    SourceState,
+)
 from dcdrw_msgs_py.quantity import Field, fields, lookup
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
 from dcdrw_msgs_py.samples import Footfall, JointSample, PhaseSample
+from dcdrw_tracker.gait.diagnostics import diagnose_sync
+from dcdrw_tracker.gait.pair_state import judge
 from dcdrw_tracker.gait.sync import SyncMonitor, SyncStatus
 
 FRAME_RATE = 25.0
@@ -25,18 +33,23 @@ POINT_NS = 20_000_000
 FRAMES_KEPT = round(WINDOW_SECONDS * FRAME_RATE)
 """Frames from which a browser that comes later draws the charts."""
 STALE_SECONDS = 1.0
-"""Without a sample for this long there is no data."""
+"""Without a sample for this long the data are late [s]."""
 SILENT_SECONDS = 3.0
 """A node that has said nothing on /diagnostics for this long is silent; each speaks once a second."""
 STEPS_SHOWN = 60
-NODES_SHOWN = 32
+STRANGERS_SHOWN = 24
+"""Nodes of other names than the suite's that are listed at most: the last that spoke."""
 _PENDING = 1000
 """Points and footfalls that wait for the next frame at most: more than any source sends from one to the next."""
 _MATCHED = 1000
 """Samples of both streams kept to find a pair of one stamp, as the streams may come with different lags."""
 
-SYNCHRONIZED, CONVERGING, STALLED, NO_DATA = 'SYNCHRONIZED', 'CONVERGING', 'STALLED', 'NO DATA'
+LATE_DATA = 'late_data'
+"""The state where samples came, but not of late; a page that hears nothing of `dcdrw live` is itself late."""
+LONGEST_MESSAGE = 200
+"""Of what a node says of itself, so much is shown [characters]."""
 
+_SUITE = {node.name for node in EXECUTABLES}
 CONTROLS = {field.name: field for field in fields(RigParams) if field.name in ('k', 'b', 'slope')}
 """What the page's sliders set."""
 
@@ -73,8 +86,7 @@ def read_command(text: str) -> Command:
 
 
 class _Health(NamedTuple):
-    level: int
-    message: str
+    said: Diagnosis
     at: float
 
 
@@ -91,7 +103,6 @@ class LiveState:
         self._phases: deque[PhaseSample] = deque(maxlen=_MATCHED)
         self._joints_at = self._phase_at = -math.inf
         self._counted, self._counted_at, self._rate = 0, -math.inf, math.nan
-        self._verdict: bool | None = None
         self._health: dict[str, _Health] = {}
         self._feet: dict[str, float] = {}
         self._run = 0
@@ -105,7 +116,6 @@ class LiveState:
         self._board_at = -math.inf
         self._told_steps = 0
         self._controls: RigParams | None = None
-        self._paused = self._recording = False
 
     @property
     def complete(self) -> bool:
@@ -157,21 +167,17 @@ class LiveState:
         self._feet[fall.wheel] = fall.x
         self._falls.append([fall.wheel, self._seconds(fall.stamp_ns), fall.steps])
 
-    def take_verdict(self, synchronized: bool) -> None:
-        """Take what the monitor says on `synchronized`."""
-        self._verdict = synchronized
-
-    def take_health(self, name: str, level: int, message: str, now: float) -> None:
+    def take_health(self, name: str, said: Diagnosis, now: float) -> None:
         """Take what a node says of itself on `/diagnostics`."""
+        said = said._replace(message=said.message[:LONGEST_MESSAGE])
+        if name not in _SUITE:
+            said = said._replace(values={})
         last = self._health.pop(name, None)
-        self._health[name] = _Health(level, message, now)  # the last that spoke is last
-        if len(self._health) > NODES_SHOWN:
-            del self._health[next(iter(self._health))]
-        if name == SIMULATOR.name and message in ('paused', 'running'):
-            self._paused = message == 'paused'
-        elif name == RECORDER.name:
-            self._recording = message.startswith('recording')
-        if last is None or last[:2] != (level, message):
+        self._health[name] = _Health(said, now)  # the last that spoke is last
+        strangers = [other for other in self._health if other not in _SUITE]
+        if len(strangers) > STRANGERS_SHOWN:
+            del self._health[strangers[0]]
+        if last is None or last.said != said:
             self._renew()
 
     def take_controls(self, rig: RigParams | None) -> None:
@@ -182,12 +188,6 @@ class LiveState:
         if rig:
             self.configure(rig=rig)
 
-    def take_switches(self, *, paused: bool | None = None, recording: bool | None = None) -> None:
-        """Take what a button has done, before its node says so on `/diagnostics`."""
-        self._paused = self._paused if paused is None else paused
-        self._recording = self._recording if recording is None else recording
-        self._renew()
-
     def notice(self, text: str, ok: bool) -> None:
         """Tell all who watch what came of a command."""
         self._notices.append({'text': text, 'ok': ok})
@@ -196,7 +196,8 @@ class LiveState:
         """What is new since the last frame, ready for JSON: no NaN; angles in degrees where a name says so."""
         status = self._monitor.status()
         state, detail = self._judge(status, now)
-        frame: dict[str, Any] = {'state': state, 'detail': detail, 'run': self._run}
+        age = _rounded(now - self._phase_at, 2)
+        frame: dict[str, Any] = {'state': state, 'detail': detail, 'age': age, 'run': self._run}
         if self._phases:
             frame['rig'] = self._rig()
         for name, new in (
@@ -233,28 +234,26 @@ class LiveState:
             self._epoch_ns = stamp_ns
         return round((stamp_ns - self._epoch_ns) * 1e-9, 4)
 
-    def _speaks(self, name: str, now: float) -> bool:
-        return name in self._health and now - self._health[name].at <= SILENT_SECONDS
+    def _says(self, name: str, now: float) -> Diagnosis | None:
+        """What a node of the suite said last; None where it is silent."""
+        health = self._health.get(name)
+        return health.said if health and now - health.at <= SILENT_SECONDS else None
 
     def _judge(self, status: SyncStatus, now: float) -> tuple[str, str]:
         """The state, and a line that explains it."""
         age = now - self._phase_at
         if not age <= STALE_SECONDS:
-            return NO_DATA, self._why_no_data(age, now)
-        detail = 'paused: the wheels are held' if self._paused and self._speaks(SIMULATOR.name, now) else ''
-        if status.stalled:
-            return STALLED, detail or f'no more strikes of the {" and the ".join(status.stalled)} wheel'
-        # The monitor has watched for longer than this page; where none speaks, the same core judges here.
-        monitor = self._health[SYNC_MONITOR.name] if self._speaks(SYNC_MONITOR.name, now) else None
-        if self._verdict if monitor else status.synchronized:
-            message = monitor.message if monitor else ''
-            return SYNCHRONIZED, detail or (message if message.startswith('synchronized') else 'in step')
-        if status.slipped:
-            detail = detail or f'slipped a step: n = {status.step_difference}'
-        elif status.lost:
-            detail = detail or 'synchronization was lost'
-        band, hold = self._params.sync.band_percent, self._params.sync.hold_steps
-        return CONVERGING, detail or f'until the error stays within ±{band:g} % for {hold} steps'
+            return LATE_DATA if math.isfinite(age) else PairState.NO_DATA.value, self._why_no_data(age, now)
+        simulator = self._says(SIMULATOR.name, now)
+        if simulator and simulator.state(SourceState) is SourceState.PAUSED:
+            return PairState.HELD.value, simulator.message
+        # The monitor has watched for longer than this page; where it says nothing, the same judge judges here.
+        said = self._says(SYNC_MONITOR.name, now)
+        state = said.state(PairState) if said else None
+        if said is None or state is None or state is PairState.NO_DATA:
+            said = diagnose_sync(status, 0.0, STALE_SECONDS)
+            state = judge(status)
+        return state.value, said.message
 
     def _why_no_data(self, age: float, now: float) -> str:
         if now - self._joints_at <= STALE_SECONDS:
@@ -306,7 +305,7 @@ class LiveState:
         """What seldom changes."""
         params = self._params
         shapes = params.phase.front, params.phase.rear
-        simulated = self._controls is not None and self._speaks(SIMULATOR.name, now)
+        simulator, recorder = self._says(SIMULATOR.name, now), self._says(RECORDER.name, now)
         return {
             'wheels': [[shape.length, shape.spokes] for shape in shapes],
             'slope': params.rig.slope,
@@ -319,17 +318,18 @@ class LiveState:
             'ratio': _rounded(status.contraction, 3),
             'nodes': [self._node(name, now) for name in sorted(self._health)],
             'controls': [_control(field, params.rig) for field in CONTROLS.values()],
-            'simulated': simulated,
-            'paused': self._paused,
-            'recorder': self._speaks(RECORDER.name, now),
-            'recording': self._recording,
+            'simulated': self._controls is not None and simulator is not None,
+            'paused': simulator is not None and simulator.state(SourceState) is SourceState.PAUSED,
+            'recorder': recorder is not None,
+            'recording': recorder is not None and recorder.state(RecorderState) is RecorderState.RECORDING,
         }
 
     def _node(self, name: str, now: float) -> dict[str, Any]:
-        level, message, at = self._health[name]
+        said, at = self._health[name]
+        level, message = said.level, said.message
         if now - at > SILENT_SECONDS:
             level, message = Level.STALE, f'silent for {now - at:.0f} s'
-        return {'name': name, 'level': Level(level).name, 'message': message}
+        return {'name': name, 'level': level.name, 'message': message}
 
 
 def _control(field: Field, rig: RigParams) -> dict[str, Any]:

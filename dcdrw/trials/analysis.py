@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.suite.parameter_file import TrialParams
+from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.samples import SECOND, CouplerSample, Footfall, JointSample, PhaseSample, Turn, run_of
+from dcdrw_tracker.gait.pair_state import judge
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseStatus
+from dcdrw_tracker.gait.rest import moves
 from dcdrw_tracker.gait.sync import SyncMonitor, SyncStatus
 
-HELD = 0.1
-"""A wheel that turns slower may be held, seen through the noise of a camera [rad/s]."""
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -85,6 +86,27 @@ class Analysis(NamedTuple):
         """The angle φ of a whole step, α1 + α2 [rad]."""
         return self.params.sync.front.alpha + self.params.sync.rear.alpha
 
+    @property
+    def state(self) -> PairState:
+        """What the pair did in the end. Wheels that are held after they have walked take nothing back."""
+        return judge(self.status._replace(held=self.status.held and not self.footfalls))
+
+    @property
+    def ran(self) -> bool:
+        """Whether the wheels were let go: else there is nothing to judge, nor to draw."""
+        return self.state not in (PairState.NO_DATA, PairState.HELD)
+
+    @property
+    def why_not_run(self) -> str:
+        """What was there in the place of a trial; empty where it ran."""
+        if self.state is PairState.HELD:
+            return f'the wheels were held for the {self.motion.seconds[-1]:.1f} s that were recorded'
+        if self.state is not PairState.NO_DATA:
+            return ''
+        if self.unreadable:
+            return f'no joint state could be read: {self.unreadable}'
+        return 'no joint state was of use' if self.joint_states else 'there are no joint states'
+
 
 def analyze(batches: Iterable[JointBatch], params: TrialParams) -> Analysis:
     """Run estimator and monitor over the joint states of a trial.
@@ -96,11 +118,6 @@ def analyze(batches: Iterable[JointBatch], params: TrialParams) -> Analysis:
         for batch in batches:
             trial.take(batch)
     return trial.result()
-
-
-def moves(phase: PhaseSample) -> bool:
-    """Whether a wheel moves; one of unknown speed does."""
-    return not (abs(phase.front.rate) <= HELD and abs(phase.rear.rate) <= HELD)
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from dcdrw.recordings.recording import find
 from dcdrw.trials.analysis import Analysis
 from dcdrw.trials.decay import Decay, fit_decay
 from dcdrw.trials.results import read_trial
-from dcdrw.trials.summary import final_band
+from dcdrw.trials.summary import Summary, final_band, summarize
 from dcdrw_msgs_py.rig import FRONT, RigParams
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.topics import JOINT_STATES
@@ -22,11 +22,12 @@ from dcdrw_msgs_py.topics import JOINT_STATES
 SIMULATED, MEASURED = 'simulated', 'measured'
 
 
-class Trial(NamedTuple):
+class RecordedTrial(NamedTuple):
     """A recorded trial and what was recorded about it."""
 
     name: str
     analysis: Analysis
+    summary: Summary
     source: str
     """SIMULATED or MEASURED."""
     about: dict[str, str]
@@ -40,9 +41,11 @@ class Trial(NamedTuple):
 TRIAL_COLUMNS: dict[str, Any] = {
     'trial': lambda trial: trial.name,
     'source': lambda trial: trial.source,
+    'state': lambda trial: trial.summary.state.value,
+    'reason': lambda trial: trial.summary.reason,
+    'synchronized': lambda trial: trial.summary.synchronized,
     'initial_phase_percent': lambda trial: 100.0 * trial.analysis.status.initial_phase,
-    'synchronized': lambda trial: trial.analysis.status.synchronized,
-    'steps_to_synchronization': lambda trial: trial.analysis.status.steps_to_synchronization,
+    'steps_to_synchronization': lambda trial: trial.summary.steps_to_synchronization,
     'final_phase_low_percent': lambda trial: 50.0 + final_band(trial.analysis)[0],
     'final_phase_high_percent': lambda trial: 50.0 + final_band(trial.analysis)[1],
     'contraction_per_step': lambda trial: trial.decay.ratio,
@@ -50,9 +53,9 @@ TRIAL_COLUMNS: dict[str, Any] = {
     'k': lambda trial: trial.rig.k,
     'b': lambda trial: trial.rig.b,
     'slope_deg': lambda trial: math.degrees(trial.rig.slope),
-    'front_steps': lambda trial: trial.analysis.status.steps,
-    'slips': lambda trial: trial.analysis.status.slips,
-    'seconds': lambda trial: float(trial.analysis.motion.seconds[-1]),
+    'front_steps': lambda trial: trial.summary.front_steps,
+    'slips': lambda trial: trial.summary.slips,
+    'seconds': lambda trial: trial.summary.duration_s,
     'samples_lost': lambda trial: trial.analysis.status.cadence.lost,
     'started': lambda trial: trial.about.get('started', ''),
     'note': lambda trial: trial.about.get('note', ''),
@@ -60,7 +63,7 @@ TRIAL_COLUMNS: dict[str, Any] = {
 STEP_COLUMNS = ('trial', 'wheel', 'steps', 'seconds', 'x', 'error_percent')
 
 
-def open_trial(path: Path, name: str, rig: Path | None = None, topic: str = JOINT_STATES.name) -> Trial:
+def open_trial(path: Path, name: str, rig: Path | None = None, topic: str = JOINT_STATES.name) -> RecordedTrial:
     """Analyze a recording, and read what was recorded about it.
 
     Raises:
@@ -68,8 +71,6 @@ def open_trial(path: Path, name: str, rig: Path | None = None, topic: str = JOIN
 
     """
     analysis, _ = read_trial(path, rig=rig, topic=topic)
-    if not len(analysis.motion.stamp_ns):
-        raise ValueError(f'{path} has no joint state that could be used')
     folder = find(path)
     folder = folder if folder.is_dir() else folder.parent
     errors = analysis.status.history
@@ -77,7 +78,7 @@ def open_trial(path: Path, name: str, rig: Path | None = None, topic: str = JOIN
     built = analysis.params.rig
     if source == MEASURED and not rig:
         built = built._replace(k=math.nan, b=math.nan, slope=math.nan)
-    return Trial(name, analysis, source, _about(folder), fit_decay(errors), built)
+    return RecordedTrial(name, analysis, summarize(analysis), source, _about(folder), fit_decay(errors), built)
 
 
 def table(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
@@ -89,16 +90,22 @@ def table(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
     return file.getvalue()
 
 
-def step_rows(trial: Trial) -> Iterable[tuple[Any, ...]]:
+def step_rows(trial: RecordedTrial) -> Iterable[tuple[Any, ...]]:
     """Every footfall, with the error at those of the front wheel."""
     errors = iter(trial.analysis.status.history)
-    start = int(trial.analysis.motion.stamp_ns[0])
     for fall in trial.analysis.footfalls:
         error = next(errors, math.nan) if fall.wheel == FRONT else math.nan
-        yield trial.name, fall.wheel, fall.steps, (fall.stamp_ns - start) / SECOND, fall.x, error
+        yield (
+            trial.name,
+            fall.wheel,
+            fall.steps,
+            (fall.stamp_ns - int(trial.analysis.motion.stamp_ns[0])) / SECOND,
+            fall.x,
+            error,
+        )
 
 
-def new_name(path: Path, others: list[Trial]) -> str:
+def new_name(path: Path, others: list[RecordedTrial]) -> str:
     """The recording's name; that of the trial where it is the one within its folder."""
     path = path.resolve()
     name = path.stem if path.is_file() else path.parent.name if path.name == 'recording' else path.name

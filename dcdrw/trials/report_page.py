@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from dcdrw.trials.day import Trial
+from dcdrw.trials.day import RecordedTrial
 from dcdrw.trials.figure import draw_trial
-from dcdrw.trials.summary import final_band, sentence
+from dcdrw.trials.summary import final_band
+from dcdrw_msgs_py.diagnosis import PairState
 
 # Okabe and Ito's palette.
 _COLOURS = '#0072B2', '#D55E00', '#009E73', '#CC79A7', '#56B4E9', '#E69F00', '#000000'
@@ -28,7 +29,7 @@ h2 { margin-top: 3rem; border-bottom: 1px solid var(--line); }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: .3rem .5rem; border-bottom: 1px solid var(--line); text-align: right; white-space: nowrap; }
 th:first-child, td:first-child, .text { text-align: left; }
-.ok { color: var(--ok); font-weight: 600; } .bad { color: var(--bad); font-weight: 600; }
+.ok { color: var(--ok); font-weight: 600; } .bad { color: var(--bad); font-weight: 600; } .none { opacity: .7; }
 figure { margin: 1rem 0; background: white; border-radius: .4rem; padding: .4rem; }
 figure svg { display: block; width: 100%; height: auto; }
 figcaption { color: #333; font-size: .9rem; padding: 0 .6rem .4rem; }
@@ -55,7 +56,7 @@ _PAGE = """<!doctype html>
 """
 
 
-def page(title: str, trials: Sequence[Trial], tables: Mapping[str, str]) -> str:
+def page(title: str, trials: Sequence[RecordedTrial], tables: Mapping[str, str]) -> str:
     """The page.
 
     Args:
@@ -71,11 +72,13 @@ def page(title: str, trials: Sequence[Trial], tables: Mapping[str, str]) -> str:
         f'<a download="{name}" href="data:text/csv;base64,{base64.b64encode(text.encode()).decode()}">{name}</a>'
         for name, text in tables.items()
     )
-    overview = f'<div class="wide">{_table(trials)}</div>\n<p>{downloads}</p>\n' + _figure(
-        _overlay(trials),
-        'Phase difference at the strikes of the front wheel, dashed where it was '
-        'measured. 50 % of a step is 25 % of a stride.',
-    )
+    overview = f'<div class="wide">{_table(trials)}</div>\n<p>{downloads}</p>\n'
+    if any(trial.analysis.ran for trial in trials):
+        overview += _figure(
+            _overlay([trial for trial in trials if trial.analysis.ran]),
+            'Phase difference at the strikes of the front wheel, dashed where it was '
+            'measured. 50 % of a step is 25 % of a stride.',
+        )
     return _PAGE.format(
         title=html.escape(title),
         style=_STYLE,
@@ -84,7 +87,7 @@ def page(title: str, trials: Sequence[Trial], tables: Mapping[str, str]) -> str:
     )
 
 
-def _table(trials: Sequence[Trial]) -> str:
+def _table(trials: Sequence[RecordedTrial]) -> str:
     heads = (
         'trial',
         'source',
@@ -101,13 +104,13 @@ def _table(trials: Sequence[Trial]) -> str:
     units = ('', '', '% of a step', 'steps', '% of a step', '% of the error', '% of a step', 'N/m', 'N·s/m', '°', '')
     rows = [''.join(f'<th>{head}<br><small>{unit}</small></th>' for head, unit in zip(heads, units, strict=True))]
     for number, trial in enumerate(trials):
-        status, rig = trial.analysis.status, trial.rig
+        rig, summary = trial.rig, trial.summary
         low, high = final_band(trial.analysis)
-        steps = status.steps_to_synchronization
+        steps = summary.steps_to_synchronization
         cells = (
             f'<a href="#trial{number}">{html.escape(trial.name)}</a>',
             trial.source,
-            _number(100 * status.initial_phase, 1),
+            _number(100 * trial.analysis.status.initial_phase, 1),
             '–' if steps is None else str(steps),
             f'{_number(50 + low, 1)} to {_number(50 + high, 1)}',
             _number(100 * trial.decay.ratio, 1),
@@ -119,22 +122,34 @@ def _table(trials: Sequence[Trial]) -> str:
     return '<table>' + '\n'.join(f'<tr>{row}</tr>' for row in rows) + '</table>'
 
 
-def _verdict(trial: Trial) -> str:
-    status = trial.analysis.status
-    if status.synchronized:
-        return '<span class="ok">synchronized</span>'
-    word = 'stalled' if status.stalled else 'lost again' if status.lost else 'not synchronized'
-    return f'<span class="bad">{word}</span>'
+_VERDICTS = {
+    PairState.NO_DATA: ('not run: no data', 'none'),
+    PairState.HELD: ('not run: held', 'none'),
+    PairState.STALLED: ('stalled', 'bad'),
+    PairState.SLIPPED: ('slipped a step', 'bad'),
+    PairState.LOST: ('lost again', 'bad'),
+    PairState.SYNCHRONIZED: ('synchronized', 'ok'),
+    PairState.CONVERGING: ('not synchronized', 'bad'),
+}
+"""What each state at the end of a trial means, and the class of the cell that says so."""
 
 
-def _section(number: int, trial: Trial) -> str:
+def _verdict(trial: RecordedTrial) -> str:
+    words, kind = _VERDICTS[trial.summary.state]
+    return f'<span class="{kind}">{words}</span>'
+
+
+def _section(number: int, trial: RecordedTrial) -> str:
     about = ''.join(
         f'<dt>{html.escape(name.replace("_", " "))}</dt><dd>{html.escape(value)}</dd>'
         for name, value in trial.about.items()
     )
+    text = f'<h2 id="trial{number}">{html.escape(trial.name)}</h2>\n<p>{html.escape(trial.summary.sentence)}</p>\n'
+    text += f'<dl>{about}</dl>\n' if about else ''
+    if not trial.analysis.ran:
+        return text
     return (
-        f'<h2 id="trial{number}">{html.escape(trial.name)}</h2>\n<p>{html.escape(sentence(trial.analysis))}</p>\n'
-        + (f'<dl>{about}</dl>\n' if about else '')
+        text
         + _figure(_picture(trial), 'Stance angles, phase difference with its band, footfalls and coupler force.')
         + _figure(_decay(trial), 'Error at each strike of the front wheel, and the geometric decay fitted to it.')
     )
@@ -144,14 +159,14 @@ def _figure(svg: str, caption: str) -> str:
     return f'<figure>{svg}<figcaption>{caption}</figcaption></figure>\n'
 
 
-def _picture(trial: Trial) -> str:
+def _picture(trial: RecordedTrial) -> str:
     with TemporaryDirectory() as folder:
         path = Path(folder) / 'trial.svg'
         draw_trial(trial.analysis, '', path)
         return _inline(path.read_text(encoding='utf-8'))
 
 
-def _overlay(trials: Sequence[Trial]) -> str:
+def _overlay(trials: Sequence[RecordedTrial]) -> str:
     figure, axes = _axes()
     band = max(trial.analysis.params.sync.band_percent for trial in trials)
     axes.axhspan(50 - band, 50 + band, color=_BAND, alpha=0.18, linewidth=0, label=f'±{band:g} % of 50 %')
@@ -172,7 +187,7 @@ def _overlay(trials: Sequence[Trial]) -> str:
     return _svg(figure)
 
 
-def _decay(trial: Trial) -> str:
+def _decay(trial: RecordedTrial) -> str:
     figure, axes = _axes()
     band, errors = trial.analysis.params.sync.band_percent, np.array(trial.analysis.status.history)
     steps = np.arange(1, len(errors) + 1)

@@ -5,7 +5,6 @@ import json
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.leg_recording import find_topic, leg_topics, namespace_of, wheel_batches
@@ -15,7 +14,7 @@ from dcdrw.trials.agreement import Agreement, compare
 from dcdrw.trials.analysis import Analysis, analyze
 from dcdrw.trials.figure import draw_trial
 from dcdrw.trials.leg_walk import follow_recording
-from dcdrw.trials.summary import sentence, summarize
+from dcdrw.trials.summary import sentence, summarize, to_json
 from dcdrw_msgs_py.samples import Footfall
 from dcdrw_msgs_py.topics import JOINT_STATES
 
@@ -82,15 +81,15 @@ def describe(agreements: dict[str, Agreement]) -> dict[str, dict[str, int]]:
     return {topic: agreement._asdict() for topic, agreement in agreements.items()}
 
 
-def write_results(trial: Analysis, folder: Path, **more: Any) -> None:
-    """Write summary.json, samples.csv, footfalls.csv and trial.png into a folder.
+def write_results(trial: Analysis, folder: Path, **more: object) -> None:
+    """Write summary.json, samples.csv, footfalls.csv and, where there is something to draw, trial.png into a folder.
 
     Raises:
         ValueError: there is no picture, for want of matplotlib; all else is written.
         OSError: the disk is full, say.
 
     """
-    content = json.dumps({**more, **summarize(trial)}, indent=1, ensure_ascii=False)
+    content = json.dumps(to_json({**more, **summarize(trial)._asdict()}), indent=1, ensure_ascii=False)
     (folder / 'summary.json').write_text(content + '\n', encoding='utf-8')
     with (folder / 'samples.csv').open('w', encoding='utf-8', newline='') as file:
         writer = csv.writer(file)
@@ -100,5 +99,5 @@ def write_results(trial: Analysis, folder: Path, **more: Any) -> None:
         writer = csv.writer(file)
         writer.writerow(Footfall._fields)
         writer.writerows(trial.footfalls)
-    if len(trial.motion.stamp_ns):
+    if trial.ran:
         draw_trial(trial, sentence(trial), folder / 'trial.png')

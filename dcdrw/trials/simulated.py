@@ -18,7 +18,7 @@ from dcdrw.trials.agreement import Agreement
 from dcdrw.trials.analysis import Analysis, analyze
 from dcdrw.trials.filmed_rig import FilmedRig, TruthError, truth_error
 from dcdrw.trials.results import read_trial
-from dcdrw_msgs_py.diagnosis import Diagnosis, Level
+from dcdrw_msgs_py.diagnosis import Diagnosis, RecorderState, messages_of, parameters_of
 from dcdrw_msgs_py.topics import FOOTFALLS, JOINT_STATES, PHASE_STATE, SYNC_ERROR
 
 if TYPE_CHECKING:
@@ -149,11 +149,10 @@ class SimulatedTrial:
         needed, recorder = (PHASE_STATE, SYNC_ERROR), self._observer.diagnoses.get(RECORDER.name)
         if recorder is None or not {topic.name for topic in needed} <= self._observer.heard:
             return False
-        told = recorder.values
         return (
-            all(int(told.get(f'messages of /{topic.name}', 0)) > 0 for topic in (JOINT_STATES, *needed))
-            and f'messages of /{FOOTFALLS.name}' in told
-            and all(node.name in told.get('parameters of', '') for node in self._executables)
+            all(recorder.number(messages_of(f'/{topic.name}')) > 0 for topic in (JOINT_STATES, *needed))
+            and messages_of(f'/{FOOTFALLS.name}') in recorder.values
+            and all(recorder.flag(parameters_of(node.name)) for node in self._executables)
         )
 
     def _let_go(self) -> None:
@@ -197,7 +196,7 @@ class SimulatedTrial:
             if node.failure and not self._interrupted:
                 raise TrialError(node.failure)
         recorder = self._observer.diagnoses.get(RECORDER.name)
-        if recorder and recorder.level is Level.ERROR:
+        if recorder and recorder.state(RecorderState) is RecorderState.FAILED:
             raise TrialError(recorder.message)
 
     def _stop_nodes(self) -> None:

@@ -1,66 +1,107 @@
 """What a trial came to: figures for a program, a sentence for a person."""
 
 import math
-from typing import Any
+from collections.abc import Mapping
+from enum import Enum
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from dcdrw.trials.analysis import Analysis
+from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import FRONT
 
 
-def summarize(trial: Analysis) -> dict[str, Any]:
-    """Everything that a program wants to know of a trial; angles in degrees, phases in percent of a step."""
-    status, seconds = trial.status, trial.motion.seconds
-    band = final_band(trial)
-    return {
-        'sentence': sentence(trial),
-        'synchronized': status.synchronized,
-        'initial_phase_percent': _rounded(100.0 * status.initial_phase),
-        'final_phase_percent': _rounded(100.0 * status.phase),
-        'final_phase_percent_of_stride': _rounded(50.0 * status.phase),
-        'steps_to_synchronization': status.steps_to_synchronization,
-        'band_percent': trial.params.sync.band_percent,
-        'final_band_percent': [_rounded(value) for value in band],
-        'final_phi_deg': [_rounded(math.degrees((0.5 + value / 100.0) * trial.pitch)) for value in band],
-        'contraction_per_step': _rounded(status.contraction),
-        'error_percent_per_step': [_rounded(error) for error in status.history],
-        'front_steps': status.steps,
-        'footfalls': len(trial.footfalls),
-        'slips': status.slips,
-        'losses_of_synchronization': status.losses,
-        'stalled': list(status.stalled),
-        'duration_s': _rounded(float(seconds[-1]) if len(seconds) else 0.0),
-        'samples': {
-            'joint_states': trial.joint_states,
-            'phase_state': len(seconds),
-            'gaps': status.cadence.gaps,
-            'lost': status.cadence.lost,
-        },
-        'parameters': {name: _plain(flatten(values)) for name, values in trial.params._asdict().items()},
-    }
+class Samples(NamedTuple):
+    """What came of the messages of a trial."""
+
+    joint_states: int
+    phase_state: int
+    gaps: int
+    lost: int
+
+
+class Summary(NamedTuple):
+    """Everything that a program wants to know of a trial. What no trial was run for is None."""
+
+    sentence: str
+    state: PairState
+    """What the pair did in the end."""
+    reason: str | None
+    """Why there is no verdict; None where there is one."""
+    synchronized: bool | None
+    initial_phase_percent: float | None
+    """Of a step, as every phase but the next but one."""
+    final_phase_percent: float | None
+    final_phase_percent_of_stride: float | None
+    steps_to_synchronization: int | None
+    band_percent: float
+    final_band_percent: tuple[float | None, float | None]
+    """Least and greatest error over the last steps."""
+    final_phi_deg: tuple[float | None, float | None]
+    contraction_per_step: float | None
+    error_percent_per_step: tuple[float | None, ...]
+    front_steps: int
+    footfalls: int
+    slips: int
+    losses_of_synchronization: int
+    stalled: tuple[str, ...]
+    """The wheels that have stalled."""
+    duration_s: float | None
+    samples: Samples
+    parameters: dict[str, dict[str, Any]]
+    """Of each node; None where derived from others."""
+
+
+def summarize(trial: Analysis) -> Summary:
+    """Everything that a program wants to know of a trial."""
+    status, seconds, state = trial.status, trial.motion.seconds, trial.state
+    synchronized = state is PairState.SYNCHRONIZED
+    low, high = final_band(trial)
+    return Summary(
+        sentence=sentence(trial),
+        state=state,
+        reason=trial.why_not_run or None,
+        synchronized=synchronized if trial.ran else None,
+        initial_phase_percent=_known(100.0 * status.initial_phase),
+        final_phase_percent=_known(100.0 * status.phase),
+        final_phase_percent_of_stride=_known(50.0 * status.phase),
+        steps_to_synchronization=status.steps_to_synchronization if synchronized else None,
+        band_percent=trial.params.sync.band_percent,
+        final_band_percent=(_known(low), _known(high)),
+        final_phi_deg=(_known(_degrees(low, trial)), _known(_degrees(high, trial))),
+        contraction_per_step=_known(status.contraction),
+        error_percent_per_step=tuple(map(_known, status.history)),
+        front_steps=status.steps,
+        footfalls=len(trial.footfalls),
+        slips=status.slips,
+        losses_of_synchronization=status.losses,
+        stalled=status.stalled,
+        duration_s=_known(seconds[-1]) if len(seconds) else 0.0,
+        samples=Samples(trial.joint_states, len(seconds), status.cadence.gaps, status.cadence.lost),
+        parameters={name: flatten(values) for name, values in trial.params._asdict().items()},
+    )
 
 
 def sentence(trial: Analysis) -> str:
     """The trial in a sentence."""
-    if not len(trial.motion.stamp_ns):
-        return 'No phase was seen: nothing to judge.'
+    if not trial.ran:
+        return f'Not run: {trial.why_not_run}.'
     status, band = trial.status, trial.params.sync.band_percent
-    start = 100.0 * status.initial_phase
+    start, end = 100.0 * status.initial_phase, 100.0 * status.phase
     low, high = final_band(trial)
-    if status.synchronized:
-        return (
-            f'From {start:.1f} % to within ±{band:g} % of 50 % of a step (25 % of a stride) in '
-            f'{status.steps_to_synchronization} steps; in the last ones {50 + low:.1f} to {50 + high:.1f} %.'
-        )
-    if status.stalled:
-        return f'From {start:.1f} %: the {" and the ".join(status.stalled)} wheel stalled after {status.steps} steps.'
-    lost = 'Synchronization was lost' if status.lost else 'Not synchronized'
-    return (
-        f'{lost}: from {start:.1f} % to {100.0 * status.phase:.1f} % in {status.steps} steps, '
-        f'outside ±{band:g} % of 50 %.'
-    )
+    course = f'from {start:.1f} % to {end:.1f} % in {status.steps} steps'
+    outside = f'outside ±{band:g} % of 50 %'
+    return {
+        PairState.STALLED: f'From {start:.1f} %: the {" and the ".join(status.stalled)} wheel stalled after '
+        f'{status.steps} steps.',
+        PairState.SLIPPED: f'A step slipped shortly before the end: {course}, n = {status.step_difference}.',
+        PairState.LOST: f'Synchronization was lost: {course}, {outside}.',
+        PairState.SYNCHRONIZED: f'From {start:.1f} % to within ±{band:g} % of 50 % of a step (25 % of a stride) in '
+        f'{status.steps_to_synchronization} steps; in the last ones {50 + low:.1f} to {50 + high:.1f} %.',
+        PairState.CONVERGING: f'Not synchronized: {course}, {outside}.',
+    }[trial.state]
 
 
 def final_band(trial: Analysis) -> tuple[float, float]:
@@ -72,9 +113,26 @@ def final_band(trial: Analysis) -> tuple[float, float]:
     return float(np.nanmin(errors)), float(np.nanmax(errors))
 
 
-def _rounded(value: float) -> float | None:
+def to_json(value: object) -> Any:
+    """A result as JSON has it: named tuples and mappings as objects, NaN as null, states by their names."""
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, tuple) and hasattr(value, '_asdict'):
+        return to_json(value._asdict())
+    if isinstance(value, Mapping):
+        return {str(name): to_json(item) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [to_json(item) for item in value]
+    return value
+
+
+def _known(value: float) -> float | None:
+    """Six digits of a figure; None where it is not known."""
     return None if math.isnan(value) else float(f'{value:.6g}')
 
 
-def _plain(values: dict[str, Any]) -> dict[str, Any]:
-    return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in values.items()}
+def _degrees(error_percent: float, trial: Analysis) -> float:
+    """The phase difference φ of an error [°]."""
+    return math.degrees((0.5 + error_percent / 100.0) * trial.pitch)

@@ -95,9 +95,9 @@ class VirtualCameraNode(Node):
         drawn, dropped = shutter.taken - self._told[0], shutter.dropped - self._told[1]
         self._told = shutter.taken, shutter.dropped
         values = {
-            'frames drawn': str(shutter.taken),
-            'frames dropped': str(shutter.dropped),
-            'frames drawn since the last report': str(drawn),
+            'frames drawn': shutter.taken,
+            'frames dropped': shutter.dropped,
+            'frames drawn since the last report': drawn,
         }
         if self._age.seconds > STALE_AFTER:
             return Diagnosis(Level.STALE, 'no joint_states', values)

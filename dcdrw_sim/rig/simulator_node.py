@@ -10,10 +10,10 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock as ClockMessage
 from std_srvs.srv import SetBool, Trigger
 
-from dcdrw_msgs_py.diagnosis import Diagnosis, Level
+from dcdrw_msgs_py.diagnosis import STATE, STEP_DIFFERENCE, Diagnosis, Level, SourceState
 from dcdrw_msgs_py.messages import JointSampleWriter, to_stamp
 from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
-from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.topics import CLOCK, COUPLER_FORCE_COMMAND, JOINT_STATES
 from dcdrw_sim.motion.ends import MotionError, accept
@@ -58,7 +58,7 @@ class SimulatorNode(Node):
         listen(self, COUPLER_FORCE_COMMAND, self._on_command)
         self.create_service(Trigger, '~/reset', self._on_reset)
         self.create_service(SetBool, '~/pause', self._on_pause)
-        report(self, self._diagnose)
+        self._report = report(self, self._diagnose)
         self._timer = self.create_timer(self._period(), self._tick, clock=steady_clock())
         self._restart()
         doing = 'holding the wheels' if self._paused else 'rolling'
@@ -123,6 +123,7 @@ class SimulatorNode(Node):
             sample = self._rig.read(timeline.rig_time, stamp_ns, self._paused)
         except MotionError as error:
             self._failure = str(error)
+            self._report()
             self.get_logger().error(f'stopped: {error}; ~/reset starts again')
             return
         if self._clock_publisher and due >= self._next_clock:
@@ -154,32 +155,38 @@ class SimulatorNode(Node):
             return response
         self._failure = ''
         self._restart()
+        self._report()
         response.success, response.message = True, 'the wheels are back at their start'
         return response
 
     def _on_pause(self, request: Any, response: Any) -> Any:
         self._paused = request.data
+        self._report()
         response.success, response.message = True, 'paused' if request.data else 'running'
         return response
 
     def _diagnose(self) -> Diagnosis:
         simulation = self._rig.simulation
-        level, message = Level.OK, 'paused' if self._paused else 'running'
-        standing = [name for name, stands in zip(('front', 'rear'), simulation.standing, strict=True) if stands]
+        standing = [name for name, stands in zip((FRONT, REAR), simulation.standing, strict=True) if stands]
+        level, state, message = Level.OK, SourceState.RUNNING, 'running'
         if self._failure:
-            level, message = Level.ERROR, self._failure
+            level, state, message = Level.ERROR, SourceState.FAILED, self._failure
+        elif self._paused:
+            state, message = SourceState.PAUSED, 'paused: the wheels are held'
         elif standing:
-            level, message = Level.WARN, f'the {" and the ".join(standing)} wheel stands still on two spokes'
+            level, state = Level.WARN, SourceState.STANDING
+            message = f'the {" and the ".join(standing)} wheel stands still on two spokes'
         behind = self._timeline.reached(self._now()) - self._timeline.due
         return Diagnosis(
             level,
             message,
             {
-                'simulated time': f'{simulation.time:.3f} s',
-                'behind the pace': f'{max(behind, 0.0):.3f} s' if math.isfinite(behind) else 'as fast as possible',
-                'n': str(simulation.steps[0] - simulation.steps[1]),
-                'external force': f'{simulation.external_force:g} N',
-                'commands refused': str(self._refused_commands),
+                STATE: state,
+                'simulated time [s]': simulation.time,
+                'behind the pace [s]': max(behind, 0.0),
+                STEP_DIFFERENCE: simulation.steps[0] - simulation.steps[1],
+                'external force [N]': simulation.external_force,
+                'commands refused': self._refused_commands,
             },
         )
 

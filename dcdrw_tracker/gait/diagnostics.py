@@ -2,8 +2,31 @@
 
 import math
 
-from dcdrw_msgs_py.diagnosis import Diagnosis, Level
+from dcdrw_msgs_py.diagnosis import (
+    AGE,
+    CONTRACTION,
+    ERROR,
+    ERROR_DEG,
+    GAPS,
+    HIGHEST_ERROR,
+    LONGEST_GAP,
+    LOST_SAMPLES,
+    LOWEST_ERROR,
+    PHASE,
+    PHASE_OF_STRIDE,
+    RATE_IN,
+    RESTARTS,
+    STATE,
+    STEP_DIFFERENCE,
+    STEPS,
+    STEPS_TO_SYNCHRONIZATION,
+    Diagnosis,
+    Level,
+    PairState,
+    Value,
+)
 from dcdrw_tracker.gait.cadence import CadenceStatus
+from dcdrw_tracker.gait.pair_state import judge
 from dcdrw_tracker.gait.phase import PhaseStatus, Refusal
 from dcdrw_tracker.gait.sync import SyncStatus
 
@@ -17,26 +40,28 @@ def diagnose_sync(status: SyncStatus, age: float, stale_after: float) -> Diagnos
         stale_after: age from which the input is stale [s].
 
     """
-    level, message = _judge_sync(status, age, stale_after)
+    state = judge(status, age <= stale_after)
     low, high = status.swing_percent
     steps = status.steps_to_synchronization
     return Diagnosis(
-        level,
-        message,
+        _LEVELS.get(state, Level.OK),
+        _message(state, status, age),
         {
-            'phase': phase_text(status.phase),
-            'error': f'{_number(status.error_percent, "+.1f", " %")} '
-            f'({_number(math.degrees(status.error), "+.2f", "°")})',
-            'error within the last step': f'{_number(low, "+.1f")} to {_number(high, "+.1f", " %")}',
-            'n': str(status.step_difference),
-            'steps': str(status.steps),
-            'synchronized': str(status.synchronized).lower(),
-            'steps to synchronization': 'unknown' if steps is None else str(steps),
-            'initial phase': phase_text(status.initial_phase),
-            'per-step convergence ratio': _number(status.contraction, '.3f'),
-            'slipped steps': str(status.slips),
-            'times synchronization was lost': str(status.losses),
-            'restarts of the source': str(status.restarts),
+            STATE: state,
+            PHASE: 100.0 * status.phase,
+            PHASE_OF_STRIDE: 50.0 * status.phase,
+            ERROR: status.error_percent,
+            ERROR_DEG: math.degrees(status.error),
+            LOWEST_ERROR: low,
+            HIGHEST_ERROR: high,
+            STEP_DIFFERENCE: status.step_difference,
+            STEPS: status.steps,
+            STEPS_TO_SYNCHRONIZATION: math.nan if steps is None else steps,
+            'initial phase [%]': 100.0 * status.initial_phase,
+            CONTRACTION: status.contraction,
+            'slipped steps': status.slips,
+            'times synchronization was lost': status.losses,
+            RESTARTS: status.restarts,
             **_stream(status.cadence, age),
         },
     )
@@ -49,44 +74,49 @@ def diagnose_phase(status: PhaseStatus, age: float, stale_after: float) -> Diagn
         level,
         message,
         {
-            'steps of the front wheel': str(status.front_steps),
-            'steps of the rear wheel': str(status.rear_steps),
-            'n': str(status.front_steps - status.rear_steps),
-            'n is certain': str(not status.n_uncertain).lower(),
-            'samples accepted': str(status.accepted),
-            **{f'samples refused: {why}': str(count) for why, count in status.refused.items()},
-            'restarts of the source': str(status.restarts),
+            'steps of the front wheel': status.front_steps,
+            'steps of the rear wheel': status.rear_steps,
+            STEP_DIFFERENCE: status.front_steps - status.rear_steps,
+            'n is certain': not status.n_uncertain,
+            'samples accepted': status.accepted,
+            **{f'samples refused: {why}': count for why, count in status.refused.items()},
+            RESTARTS: status.restarts,
             **_stream(status.cadence, age),
         },
     )
 
 
+_LEVELS = {
+    PairState.NO_DATA: Level.STALE,
+    PairState.STALLED: Level.ERROR,
+    PairState.SLIPPED: Level.WARN,
+    PairState.LOST: Level.WARN,
+}
+"""Of the states that are not OK."""
+
+
 def phase_text(phase: float) -> str:
     """The phase as people read it: of a step, and of a stride, which is two steps."""
-    return f'{_number(100.0 * phase, ".1f", " %")} of a step, {_number(50.0 * phase, ".1f", " %")} of a stride'
+    return f'{_number(100.0 * phase)} of a step, {_number(50.0 * phase)} of a stride'
 
 
-def _judge_sync(status: SyncStatus, age: float, stale_after: float) -> tuple[Level, str]:
-    if not age <= stale_after:
-        return Level.STALE, f'stale: no sample for {age:.1f} s' if math.isfinite(age) else 'no data yet'
-    if status.stamp_ns == 0:
-        return Level.OK, 'starting afresh'
-    if status.stalled:
-        return Level.ERROR, f'stalled: the {" and the ".join(status.stalled)} wheel does not strike any more'
-    if status.slipped:
-        return Level.WARN, f'slipped a step: n = {status.step_difference}'
-    if status.lost:
-        return Level.WARN, f'lost synchronization: error {status.error_percent:+.1f} %'
-    if status.synchronized:
-        return Level.OK, f'synchronized after {status.steps_to_synchronization} steps'
-    return Level.OK, f'converging: error {status.error_percent:+.1f} %'
+def _message(state: PairState, status: SyncStatus, age: float) -> str:
+    return {
+        PairState.NO_DATA: _no_sample(age),
+        PairState.HELD: 'the wheels are held',
+        PairState.STALLED: f'stalled: the {" and the ".join(status.stalled)} wheel does not strike any more',
+        PairState.SLIPPED: f'slipped a step: n = {status.step_difference}',
+        PairState.LOST: f'lost synchronization: error {status.error_percent:+.1f} %',
+        PairState.SYNCHRONIZED: f'synchronized after {status.steps_to_synchronization} steps',
+        PairState.CONVERGING: f'converging: error {status.error_percent:+.1f} %',
+    }[state]
 
 
 def _judge_phase(status: PhaseStatus, age: float, stale_after: float) -> tuple[Level, str]:
     if not age <= stale_after:
         if status.refusal:
             return Level.STALE, f'every sample is refused: {_REASONS[status.refusal]}'
-        return Level.STALE, f'stale: no sample for {age:.1f} s' if math.isfinite(age) else 'no data yet'
+        return Level.STALE, _no_sample(age)
     if status.n_uncertain:
         return Level.WARN, f'n may be off: a gap of up to {status.cadence.longest:.2f} s may hide a step'
     return Level.OK, 'tracking both wheels'
@@ -102,13 +132,19 @@ _REASONS: dict[Refusal, str] = {
 }
 
 
-def _stream(cadence: CadenceStatus, age: float) -> dict[str, str]:
+def _no_sample(age: float) -> str:
+    return f'stale: no sample for {age:.1f} s' if math.isfinite(age) else 'no data yet'
+
+
+def _stream(cadence: CadenceStatus, age: float) -> dict[str, Value]:
     return {
-        'rate in': _number(cadence.rate, '.1f', ' Hz'),
-        'gaps': f'{cadence.gaps} ({cadence.lost} samples lost, longest {cadence.longest:.3f} s)',
-        'age of the last sample': _number(age, '.3f', ' s'),
+        RATE_IN: cadence.rate,
+        GAPS: cadence.gaps,
+        LOST_SAMPLES: cadence.lost,
+        LONGEST_GAP: cadence.longest,
+        AGE: age,
     }
 
 
-def _number(value: float, form: str, unit: str = '') -> str:
-    return f'{value:{form}}{unit}' if math.isfinite(value) else 'unknown'
+def _number(value: float) -> str:
+    return f'{value:.1f} %' if math.isfinite(value) else 'unknown'

@@ -13,6 +13,7 @@ from dcdrw_msgs_py.rig import FRONT, REAR, WheelPitch
 from dcdrw_msgs_py.samples import PhaseSample, SyncSample, Turn
 from dcdrw_tracker.gait.cadence import Cadence, CadenceStatus
 from dcdrw_tracker.gait.contraction import WINDOW, contraction
+from dcdrw_tracker.gait.rest import Rest
 
 HISTORY = 10_000
 """Steps whose error is kept."""
@@ -67,6 +68,8 @@ class SyncStatus(NamedTuple):
     """p at the start."""
     steps: int = 0
     """Strikes of the front wheel."""
+    held: bool = False
+    """The wheels are held: they have not moved yet, or rest where none stays by itself."""
     synchronized: bool = False
     steps_to_synchronization: int | None = None
     """Strikes of the front wheel up to the first within the band for good; None while not synchronized."""
@@ -113,6 +116,7 @@ class SyncMonitor:
     def reset(self) -> None:
         """Start afresh with the next sample."""
         self._last: PhaseSample | None = None
+        self._is_held = False
         self._error = self._smooth = self._initial_phase = self._contraction = math.nan
         self._steps = 0
         self._history: deque[float] = deque(maxlen=HISTORY)
@@ -147,6 +151,9 @@ class SyncMonitor:
         if n - last.step_difference != front_strikes - rear_strikes and not _may_miss_strikes(last, phase, dt):
             return self._restart(phase)
         self._cadence.tick(stamp_ns)
+        if self._rest.update(phase):  # the time for which the wheels were held counts for no stall
+            self._struck_ns = {FRONT: stamp_ns, REAR: stamp_ns}
+        self._is_held = self._rest.held
         if front_strikes or rear_strikes:
             self._take_strikes(last, phase, front_strikes, rear_strikes)
         self._take_step_difference(n)
@@ -167,6 +174,7 @@ class SyncMonitor:
             step_difference=last.step_difference,
             initial_phase=self._initial_phase,
             steps=self._steps,
+            held=self._is_held,
             synchronized=self._synchronized,
             steps_to_synchronization=self._entered if self._synchronized else None,
             swing_percent=self._last_swing,
@@ -184,6 +192,8 @@ class SyncMonitor:
     def _start(self, phase: PhaseSample) -> SyncSample:
         self._cadence.tick(phase.stamp_ns)
         self._last = phase
+        self._rest = Rest(phase, self._front_alpha, self._rear_alpha)
+        self._is_held = self._rest.held
         self._error = self._smooth = self._percent(phase.phi.angle)
         self._initial_phase = 0.5 + self._error / 100.0
         self._usual = phase.step_difference, phase.step_difference
@@ -265,6 +275,8 @@ class SyncMonitor:
         return math.remainder(foretold + surprise * dt / (dt + SMOOTHING), 100.0)
 
     def _stalled(self, stamp_ns: int) -> tuple[str, ...]:
+        if self._is_held:
+            return ()
         return tuple([wheel for wheel, struck_ns in self._struck_ns.items() if stamp_ns - struck_ns > self._stall_ns])
 
     def _percent(self, phi: float) -> float:
@@ -273,7 +285,8 @@ class SyncMonitor:
         return percent - 50.0 if percent < 100.0 else -50.0
 
     def _sample(self, phase: PhaseSample) -> SyncSample:
-        return SyncSample(phase.stamp_ns, self._error / 100.0 * self._pitch, self._error, self._synchronized)
+        synchronized = self._synchronized and not self._is_held  # wheels that are held do not walk
+        return SyncSample(phase.stamp_ns, self._error / 100.0 * self._pitch, self._error, synchronized)
 
 
 def _strikes(last: Turn, now: Turn, dt: float, alpha: float) -> int | None:

@@ -6,15 +6,16 @@ from typing import Any
 from rclpy.node import Node
 from std_msgs.msg import Bool, Float64
 
-from dcdrw_msgs_py.diagnosis import Diagnosis
+from dcdrw_msgs_py.diagnosis import Diagnosis, PairState
 from dcdrw_msgs_py.messages import PhaseSampleReader
 from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
 from dcdrw_msgs_py.topics import PHASE_STATE, SYNC_ERROR, SYNC_ERROR_PERCENT, SYNCHRONIZED
 from dcdrw_tracker.gait.diagnostics import diagnose_sync
+from dcdrw_tracker.gait.pair_state import judge
 from dcdrw_tracker.gait.sync import SyncMonitor, SyncParams
 
 WATCH_SECONDS = 0.1
-"""How often the age of the input is looked at."""
+"""How often the age of the input and the state of the pair are looked at."""
 
 
 class SyncMonitorNode(Node):
@@ -31,8 +32,9 @@ class SyncMonitorNode(Node):
         self._unreadable = 0
         self._age = Age()
         self._verdict: bool | None = None
+        self._state: PairState | None = None
         self._tell(False)
-        report(self, self._diagnose)
+        self._report = report(self, self._diagnose)
         self.create_timer(WATCH_SECONDS, self._watch, clock=steady_clock())
         listen(self, PHASE_STATE, self._on_phase)
 
@@ -51,9 +53,14 @@ class SyncMonitorNode(Node):
         self._tell(sync.synchronized)
 
     def _watch(self) -> None:
-        """Nobody knows whether a pair that is not seen is still in step."""
-        if self._verdict and self._age.seconds > self._settings.value.stale_after:
+        """Nobody knows whether a pair that is not seen is still in step. A change of the state is told at once."""
+        fresh = self._age.seconds <= self._settings.value.stale_after
+        if self._verdict and not fresh:
             self._tell(False)
+        state = judge(self._monitor.status(), fresh)
+        if state != self._state:
+            self._state = state
+            self._report()
 
     def say_last_words(self) -> None:
         """A monitor that has ended vouches for nothing."""
@@ -67,8 +74,7 @@ class SyncMonitorNode(Node):
 
     def _diagnose(self) -> Diagnosis:
         diagnosis = diagnose_sync(self._monitor.status(), self._age.seconds, self._settings.value.stale_after)
-        diagnosis.values['samples refused'] = str(self._unreadable)
-        return diagnosis
+        return diagnosis._replace(values={**diagnosis.values, 'samples refused': self._unreadable})
 
 
 def main(args: list[str] | None = None) -> int:

@@ -3,7 +3,8 @@
 import math
 from typing import NamedTuple
 
-from dcdrw_msgs_py.diagnosis import Diagnosis, Level
+from dcdrw_msgs_py.diagnosis import AGE, GAPS, LONGEST_GAP, LOST_SAMPLES, RATE_IN, Diagnosis, Level, Value
+from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_tracker.node.tag_tracker import TrackerStatus, WheelQuality
 from dcdrw_tracker.wheels.wheel_angles import AnglesStatus
 
@@ -35,16 +36,14 @@ class SourceStatus(NamedTuple):
 def diagnose_tags(status: TrackerStatus, source: SourceStatus) -> Diagnosis:
     """The diagnosis of a tracker that has a camera."""
     level, message = _judge_source(source) or _judge_tags(status) or _judge_angles(status.angles, source)
-    front, rear = status.front, status.rear
     return Diagnosis(
         level,
         message,
         {
-            'tags seen': f'front {_seen(status, front)}, rear {_seen(status, rear)}',
-            'reprojection error': f'front {_px(front.error_px, front)}, rear {_px(rear.error_px, rear)}',
-            'size of the tags': f'front {_px(front.size_px, front)}, rear {_px(rear.size_px, rear)}',
-            'frames with duplicate tags': str(status.duplicates),
-            'tags refused: no fit': str(status.refused_tags),
+            **_quality(status, FRONT, status.front),
+            **_quality(status, REAR, status.rear),
+            'frames with duplicate tags': status.duplicates,
+            'tags refused: no fit': status.refused_tags,
             **_angles(status.angles),
             **_source(source),
         },
@@ -99,40 +98,44 @@ def _judge_angles(status: AnglesStatus, source: SourceStatus) -> tuple[Level, st
     return Level.OK, 'tracking both wheels'
 
 
-def _angles(status: AnglesStatus) -> dict[str, str]:
-    cadence, wheels = status.cadence, (('front', status.front), ('rear', status.rear))
+def _quality(status: TrackerStatus, wheel: str, quality: WheelQuality) -> dict[str, Value]:
+    """How one wheel's tags were seen last."""
+    seen = quality.frames > 0
     return {
-        'frames': str(status.views),
-        'frames with both wheels': str(status.samples),
-        'frame rate': f'{cadence.rate:.1f} Hz' if math.isfinite(cadence.rate) else 'unknown',
-        'frames dropped': f'{cadence.lost} in {cadence.gaps} gaps, longest {cadence.longest:.3f} s',
-        'frames out of order': str(status.out_of_order),
+        f'tags of the {wheel} wheel seen': quality.tags if seen and quality.seen_ns == status.stamp_ns else 0,
+        f'reprojection error of the {wheel} wheel [px]': quality.error_px if seen else math.nan,
+        f'size of the tags of the {wheel} wheel [px]': quality.size_px if seen else math.nan,
+    }
+
+
+def _angles(status: AnglesStatus) -> dict[str, Value]:
+    cadence, wheels = status.cadence, ((FRONT, status.front), (REAR, status.rear))
+    return {
+        'frames': status.views,
+        'frames with both wheels': status.samples,
+        RATE_IN: cadence.rate,
+        GAPS: cadence.gaps,
+        LOST_SAMPLES: cadence.lost,
+        LONGEST_GAP: cadence.longest,
+        'frames out of order': status.out_of_order,
         **{
-            f'outliers of the {wheel} wheel: {why}': str(count)
+            f'outliers of the {wheel} wheel: {why}': count
             for wheel, track in wheels
             for why, count in track.outliers.items()
         },
-        **{f'views of the {wheel} wheel that waited for others': str(track.unconfirmed) for wheel, track in wheels},
-        'occlusions of more than a step restored': f'front {wheels[0][1].restored}, rear {wheels[1][1].restored}',
-        'times the turns were lost': str(status.lost),
+        **{f'views of the {wheel} wheel that waited for others': track.unconfirmed for wheel, track in wheels},
+        **{f'occlusions of the {wheel} wheel of more than a step restored': track.restored for wheel, track in wheels},
+        'times the turns were lost': status.lost,
     }
 
 
-def _source(source: SourceStatus) -> dict[str, str]:
+def _source(source: SourceStatus) -> dict[str, Value]:
     return {
-        'frames passed over while busy': str(source.dropped),
-        'frames of no use': str(source.unusable),
-        'processing time': f'{1e3 * source.seconds:.1f} ms' if math.isfinite(source.seconds) else 'unknown',
-        'age of the last frame': f'{source.age:.3f} s' if math.isfinite(source.age) else 'unknown',
+        'frames passed over while busy': source.dropped,
+        'frames of no use': source.unusable,
+        'processing time [ms]': 1e3 * source.seconds,
+        AGE: source.age,
     }
-
-
-def _seen(status: TrackerStatus, quality: WheelQuality) -> str:
-    return str(quality.tags if quality.frames and quality.seen_ns == status.stamp_ns else 0)
-
-
-def _px(value: float, quality: WheelQuality) -> str:
-    return f'{value:.3g} px' if quality.frames else 'unknown'
 
 
 def _ids(ids: tuple[int, ...]) -> str:

@@ -7,12 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sensor_msgs.msg import JointState
 
-from dcdrw_msgs_py.diagnosis import Diagnosis, Level
+from dcdrw_msgs_py.diagnosis import STATE, Diagnosis, Level, PairState, RecorderState
 from dcdrw_msgs_py.messages import (
     JointSampleReader,
     JointSampleWriter,
     PhaseSampleReader,
     PhaseSampleWriter,
+    diagnoses,
     diagnostics_message,
     footfall,
     footfall_message,
@@ -87,7 +88,32 @@ def test_phase_message_of_a_stranger_needs_no_frame():
 
 
 def test_diagnosis_is_one_status_with_its_figures():
-    message = diagnostics_message('lab/sync_monitor', Diagnosis(Level.STALE, 'no data yet', {'n': '0'}), 5)
+    message = diagnostics_message('lab/sync_monitor', Diagnosis(Level.STALE, 'no data yet', {'n': 0}), 5)
     (status,) = message.status
     assert (status.level, status.name, status.message) == (b'\x03', 'lab/sync_monitor', 'no data yet')
     assert [(pair.key, pair.value) for pair in status.values] == [('n', '0')]
+
+
+def test_diagnosis_is_read_as_it_was_written():
+    said = Diagnosis(
+        Level.WARN, 'words', {STATE: PairState.LOST, 'n': 2, 'error [%]': -7.5, 'is': True, 'not': math.nan}
+    )
+    read = diagnoses(diagnostics_message('/sync_monitor', said, 5))['sync_monitor']
+    assert (read.level, read.message) == (Level.WARN, 'words')
+    for one in (said, read):
+        assert one.state(PairState) is PairState.LOST
+        assert one.state(RecorderState) is None
+        assert (one.number('n'), one.number('error [%]')) == (2.0, -7.5)
+        assert math.isnan(one.number('not'))
+        assert math.isnan(one.number('nowhere'))
+        assert one.flag('is')
+        assert not one.flag('nowhere')
+
+
+@pytest.mark.parametrize(
+    ('name', 'hardware'),
+    [('/sync_monitor', 'dcdrw'), ('/lab/sync_monitor', 'dcdrw/lab'), ('/lab/left/recorder', 'dcdrw/lab/left')],
+)
+def test_each_rig_has_its_own_hardware_id(name, hardware):
+    (status,) = diagnostics_message(name, Diagnosis(Level.OK, '', {}), 5).status
+    assert (status.name, status.hardware_id) == (name[1:], hardware)

@@ -18,6 +18,7 @@ from rosbags.rosbag2.enums import CompressionMode
 from dcdrw.cli import main
 from dcdrw.recordings.recording import Recording
 from dcdrw.trials.results import read_trial
+from dcdrw_msgs_py.diagnosis import STEPS_TO_SYNCHRONIZATION
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatorParams
@@ -56,7 +57,8 @@ def test_live_and_offline_agree_to_the_last_bit(live_trial):
         assert recorded == equal > 900
     assert trial.status.synchronized
     assert live['synchronized']
-    assert live['diagnostics']['sync_monitor'] == f'synchronized after {trial.status.steps_to_synchronization} steps'
+    told = live['diagnostics']['sync_monitor']['values'][STEPS_TO_SYNCHRONIZATION]
+    assert int(told) == trial.status.steps_to_synchronization
     with Recording(live_trial) as recording:
         falls = recording.count('/footfalls')
     assert falls == len(trial.footfalls)

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from dcdrw.cli import main
+from dcdrw_msgs_py.diagnosis import STATE, STEPS_TO_SYNCHRONIZATION, PairState
 from tests import ROOT
 from tests.children import nodes, runs
 
@@ -27,12 +28,23 @@ STIFF = """\
 """
 
 
-def start(tmp_path: Path, *arguments: str, rig: str = STIFF) -> subprocess.Popen[str]:
+MUTE = """\
+from dcdrw_msgs_py import messages
+
+def mute(node, diagnosis, now_ns, write=messages.diagnostics_message):
+    return write(node, diagnosis._replace(message='?'), now_ns)
+
+messages.diagnostics_message = mute
+"""
+"""Read by each Python process before all else: every message on /diagnostics says the same."""
+
+
+def start(tmp_path: Path, *arguments: str, rig: str = STIFF, path: Path = ROOT) -> subprocess.Popen[str]:
     (tmp_path / 'rig.yaml').write_text(rig)
     return subprocess.Popen(
         [sys.executable, '-m', 'dcdrw.cli', 'trial', '--rig', 'rig.yaml', '--out', 'out', *arguments],
         cwd=tmp_path,
-        env={**os.environ, 'PYTHONPATH': str(ROOT)},
+        env={**os.environ, 'PYTHONPATH': f'{path}:{ROOT}'},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -63,7 +75,9 @@ def test_trial_ends_with_summary_picture_and_sentence(tmp_path):
     assert result['samples']['lost'] == 0
     assert 0 < result['steps_to_synchronization'] < 8
     # The monitor of the trial and the one that judges its record are one.
-    assert result['diagnostics']['sync_monitor'] == f'synchronized after {result["steps_to_synchronization"]} steps'
+    said = result['diagnostics']['sync_monitor']['values']
+    assert said[STATE] == result['state'] == PairState.SYNCHRONIZED
+    assert int(said[STEPS_TO_SYNCHRONIZATION]) == result['steps_to_synchronization']
     assert result['parameters']['rig']['k'] == 60.0
     low, high = result['final_band_percent']
     assert -7.0 < low < high < 7.0
@@ -74,6 +88,18 @@ def test_trial_ends_with_summary_picture_and_sentence(tmp_path):
     assert all(abs(float(row['theta1'])) <= math.pi / 12 + 1e-9 for row in rows)
     for name in ('simulator', 'phase_estimator', 'sync_monitor', 'recorder'):
         assert 'Traceback' not in (tmp_path / 'out' / f'{name}.log').read_text()
+
+
+def test_no_sentence_is_protocol(tmp_path):
+    """Whatever the nodes say to people, a trial starts, ends and is judged by the values beside it."""
+    (tmp_path / 'sitecustomize.py').write_text(MUTE)
+    process = start(tmp_path, '--initial-phase', '30', '--seconds', '6', path=tmp_path)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 0, errors
+    result = summary(tmp_path)
+    assert {said['message'] for said in result['diagnostics'].values()} == {'?'}
+    assert result['state'] == PairState.SYNCHRONIZED
+    assert result['end'] == 'complete'
 
 
 def test_interrupt_keeps_what_there_is(tmp_path):

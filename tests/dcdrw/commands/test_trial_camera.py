@@ -1,7 +1,6 @@
 """`dcdrw trial --camera`: the whole chain over real DDS, its joint states seen in pictures."""
 
 import json
-import math
 import os
 import subprocess
 import sys
@@ -10,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from dcdrw.cli import main
-from dcdrw.trials.analysis import moves
-from dcdrw_msgs_py.samples import PhaseSample, Turn
+from dcdrw_msgs_py.diagnosis import Level
 
 pytest.importorskip('cv2')
 from tests import ROOT
@@ -59,15 +57,10 @@ def test_a_filmed_trial_is_the_simulated_one(tmp_path):
     assert result['truth']['frames'] == result['samples']['joint_states'] > 20
     assert result['initial_phase_percent'] == pytest.approx(35.0, abs=1.0)
     assert result['duration_s'] == pytest.approx(4.0, abs=0.5)
-    assert result['diagnostics']['tag_tracker'] == 'tracking both wheels'
+    assert result['diagnostics']['tag_tracker']['level'] == Level.OK
     assert result['agreement']['phase_state']['equal'] == result['agreement']['phase_state']['recorded']
     for node in ('simulator', 'virtual_camera', 'tag_tracker', 'phase_estimator', 'sync_monitor', 'recorder'):
         assert 'Traceback' not in (tmp_path / 'out' / f'{node}.log').read_text()
-
-
-@pytest.mark.parametrize(('rate', 'moving'), [(0.0, False), (-0.05, False), (0.2, True), (math.nan, True)])
-def test_held_wheels_do_not_move_though_a_camera_sees_them_tremble(rate, moving):
-    assert moves(PhaseSample(0, Turn(0.1, rate), Turn(0.1, 0.01), Turn(0.1, 0.0), 0)) is moving
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,8 @@ import pytest
 from rcl_interfaces.srv import GetParameters
 from rclpy.parameter import parameter_value_to_python
 
-from dcdrw.page.live_state import NO_DATA, SYNCHRONIZED
+from dcdrw.page.live_state import LATE_DATA
+from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.messages import stamp_ns
 from dcdrw_msgs_py.topics import JOINT_STATES, PHASE_STATE
 from dcdrw_msgs_py.topics import SYNCHRONIZED as VERDICT
@@ -26,6 +27,8 @@ pytestmark = pytest.mark.processes
 
 STIFF = {'k': 60.0, 'rate': 100.0, 'initial_phase_percent': 30.0}
 STATE = 'document.body.dataset.state'
+OLD = "document.body.classList.contains('old')"
+LATE_PAGE = 'late_page'
 RIG = "JSON.stringify(document.getElementById('rig-canvas').dataset)"
 RIGHT_ARROW, HOME = ('ArrowRight', 39), ('Home', 36)
 
@@ -128,7 +131,7 @@ def test_what_is_drawn_follows_the_data(bench, live, chromium):
         assert float(now['theta2']) == pytest.approx(angles['rear_stance'], abs=1e-4)
         assert int(now['n']) == angles['step_difference']
         assert float(now['hubs']) == pytest.approx(joint.position[list(joint.name).index('coupler')], abs=1e-3)
-    tab.wait(f'{STATE} === "{SYNCHRONIZED}"')
+    tab.wait(f'{STATE} === "{PairState.SYNCHRONIZED.value}"')
     bench.wait(lambda: verdicts and verdicts[-1].data, 'the verdict')
     tab.wait("document.getElementById('detail').textContent.startsWith('synchronized after')")
     tab.wait("document.getElementById('errors-canvas').dataset.shown >= 5")
@@ -138,7 +141,7 @@ def test_what_is_drawn_follows_the_data(bench, live, chromium):
     assert abs(float(text(tab, 'error').replace('−', '-').removesuffix(' %'))) < 10.0
     tab.wait("document.querySelectorAll('#nodes .name').length === 3")
     tab.open(address.split('?')[0])  # the cookie is enough
-    tab.wait(f'{STATE} === "{SYNCHRONIZED}"')
+    tab.wait(f'{STATE} === "{PairState.SYNCHRONIZED.value}"')
     tab.wait("document.getElementById('phi-canvas').dataset.points > 100")
     assert tab.complaints == []
     assert live.end() == 0
@@ -173,7 +176,9 @@ def test_sliders_and_buttons_act_through_the_nodes(bench, live, chromium, tmp_pa
     click(tab, 'pause')
     bench.wait(lambda: joints[-1].velocity[0] == 0.0, 'a pause')
     tab.wait("document.getElementById('pause').textContent === 'Go on'")
-    tab.wait("document.getElementById('detail').textContent === 'paused: the wheels are held'")
+    tab.wait(f'{STATE} === "{PairState.HELD.value}"')
+    bench.spin(4.0)  # longer than a wheel may take for a step
+    assert tab.value(STATE) == PairState.HELD.value
     click(tab, 'pause')
     bench.wait(lambda: joints[-1].velocity[0] > 0.0, 'the end of the pause')
     turned = joints[-1].position[0]
@@ -209,34 +214,38 @@ def test_page_outlives_nodes_servers_and_sleep(bench, live, chromium):
     address = live.start()
     tab, phone = chromium.tab(address), chromium.tab(address, 390, 844, dark=True)
     for one in (tab, phone):
-        one.wait(f'{STATE} !== "{NO_DATA}"')
+        one.wait(f'!{OLD}')
     assert phone.value('document.documentElement.scrollWidth') == 390, 'nothing is cut off'
 
     phone.send('Page.setWebLifecycleState', state='frozen')
     bench.end(simulator, signal.SIGKILL)
-    tab.wait(f'{STATE} === "{NO_DATA}"')
+    tab.wait(f'{STATE} === "{LATE_DATA}"')
+    assert tab.value(OLD)
     assert 'nothing has come for' in text(tab, 'detail')
+    assert float(text(tab, 'age').split()[4]) > 1.0
+    assert text(tab, 'phi') != '–', 'what came last stays, greyed'
     bench.start('simulator', **STIFF)
-    tab.wait(f'{STATE} !== "{NO_DATA}"')
+    tab.wait(f'!{OLD}')
     phone.send('Page.setWebLifecycleState', state='active')
-    phone.wait(f'{STATE} !== "{NO_DATA}"')
+    phone.wait(f'!{OLD}')
     for one in (tab, phone):  # only what is seen is drawn, and Chromium forgets who that is while one is frozen
         one.send('Page.bringToFront')
     before = int(drawn(phone)['stampNs'])
     phone.wait(RIG, lambda rig: int(json.loads(rig)['stampNs']) > before)
     passes(phone, 'pagehide')  # as a page that its browser keeps for the back button
-    phone.wait(f'{STATE} === "{NO_DATA}"')
+    phone.wait(f'{STATE} === "{LATE_PAGE}"')
     passes(phone, 'pageshow')
-    phone.wait(f'{STATE} !== "{NO_DATA}"')
+    phone.wait(f'!{OLD}')
     assert tab.complaints == phone.complaints == []
 
     live.end(signal.SIGKILL)
-    tab.wait(f'{STATE} === "{NO_DATA}"')
-    assert 'no connection' in text(tab, 'detail')
+    tab.wait(f'{STATE} === "{LATE_PAGE}"')
+    assert tab.value(OLD)
+    assert 'hears nothing of dcdrw live' in text(tab, 'detail')
     assert tab.value("document.getElementById('reset').disabled")
     live.start()
     for one in (tab, phone):
-        one.wait(f'{STATE} !== "{NO_DATA}"')
+        one.wait(f'!{OLD}')
         # That its server was away is all that the browser itself has to say.
         assert all('WebSocket connection' in complaint for complaint in one.complaints)
 

@@ -11,18 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dcdrw.page.live_state import (
-    CONVERGING,
-    NO_DATA,
-    NODES_SHOWN,
-    STALLED,
-    STEPS_SHOWN,
-    SYNCHRONIZED,
-    Command,
-    LiveState,
-    read_command,
-)
+from dcdrw.page.live_state import LATE_DATA, STEPS_SHOWN, STRANGERS_SHOWN, Command, LiveState, read_command
 from dcdrw.suite.parameter_file import TrialParams
+from dcdrw_msgs_py.diagnosis import STATE, Diagnosis, Level, PairState, RecorderState, SourceState
 from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_msgs_py.samples import CouplerSample, Footfall, JointSample, PhaseSample, Turn
 from dcdrw_sim.rig.simulator import SimulatedRig
@@ -130,19 +121,31 @@ def test_points_are_few_and_keep_every_peak_of_the_force():
     assert [t for t, _ in phis] == sorted(t for t, _ in phis)
 
 
+def says(state: Any, message: str = '', level: Level = Level.OK) -> Diagnosis:
+    return Diagnosis(level, message, {STATE: state})
+
+
 def test_state_is_what_the_monitor_says_while_it_speaks():
     state = LiveState(TrialParams())
-    assert state.frame(0.0)['state'] == NO_DATA
+    assert state.frame(0.0)['state'] == PairState.NO_DATA.value
     for now, joints, update in walk(RigParams(), 2.0):
         show(state, now, joints, update)
-    assert state.frame(2.0)['state'] == CONVERGING
-    state.take_verdict(True)
-    state.take_health('sync_monitor', 0, 'synchronized after 7 steps', 2.0)
-    assert (state.frame(2.0)['state'], state.frame(2.0)['detail']) == (SYNCHRONIZED, 'synchronized after 7 steps')
+    assert state.frame(2.0)['state'] == PairState.CONVERGING.value
+    state.take_health('sync_monitor', says(PairState.SYNCHRONIZED, 'words'), 2.0)
+    assert (state.frame(2.0)['state'], state.frame(2.0)['detail']) == (PairState.SYNCHRONIZED.value, 'words')
     for now in (3.0, 4.0, 5.5):  # the monitor has been killed: its verdict is no longer to be trusted
         state.take_phase(update.phase._replace(stamp_ns=START_NS + round(now * 1e9)), now)
-    assert state.frame(5.5)['state'] == CONVERGING
-    assert state.frame(6.6)['state'] == NO_DATA
+    assert state.frame(5.5)['state'] == PairState.CONVERGING.value
+    assert state.frame(6.6)['state'] == LATE_DATA
+
+
+@pytest.mark.parametrize('pair', list(PairState)[1:])
+def test_every_state_of_the_monitor_is_shown_whatever_words_it_has_for_it(pair):
+    state = LiveState(TrialParams())
+    for now, joints, update in walk(RigParams(), 0.1):
+        show(state, now, joints, update)
+    state.take_health('sync_monitor', says(pair, 'synchronized paused recording stalled'), 0.1)
+    assert state.frame(0.1)['state'] == pair.value
 
 
 def test_own_judgement_stands_in_for_a_monitor():
@@ -151,32 +154,51 @@ def test_own_judgement_stands_in_for_a_monitor():
     for now, joints, update in walk(rig, 12.0, rate=200.0):
         show(state, now, joints, update)
     frame = state.frame(12.0)
-    assert frame['state'] == SYNCHRONIZED
+    assert frame['state'] == PairState.SYNCHRONIZED.value
     board = frame['board']
     assert len(board['errors']) == board['steps'] > 15
     assert abs(board['errors'][0]) > 15.0 > 6.0 > abs(board['errors'][-1])
 
 
-def test_wheels_that_stand_have_stalled():
-    state = LiveState(TrialParams())
-    for i in range(500):
-        phase = PhaseSample(START_NS + i * 10_000_000, Turn(0.1, 0.0), Turn(-0.1, 0.0), Turn(0.2, 0.0), 0)
-        state.take_phase(phase, i / 100)
-    frame = state.frame(5.0)
-    assert frame['state'] == STALLED
-    assert frame['detail'] == 'no more strikes of the front and the rear wheel'
-    state.take_health('simulator', 0, 'paused', 5.0)
-    assert state.frame(5.0)['detail'] == 'paused: the wheels are held'
+def comes_to_rest(state: LiveState, theta: float, begin: float, end: float) -> None:
+    """Both wheels turn to an angle within half a second, and stay there."""
+    frame = state.frame(begin)
+    last = frame['rig']['theta'][0] if 'rig' in frame else theta
+    for i in range(round(100 * begin), round(100 * end)):
+        share = min((i / 100 - begin) / 0.5, 1.0)
+        turn = Turn(last + share * (theta - last), 2.0 * (theta - last) if share < 1.0 else 0.0)
+        state.take_phase(PhaseSample(START_NS + i * 10_000_000, turn, turn, Turn(0.2, 0.0), 0), i / 100)
 
 
-def test_no_data_says_why():
+def test_wheels_that_stand_have_stalled_and_wheels_that_rest_elsewhere_are_held():
     state = LiveState(TrialParams())
-    assert 'is the source running' in state.frame(0.0)['detail']
+    comes_to_rest(state, -0.1, 0.0, 1.0)
+    assert state.frame(1.0)['state'] == PairState.HELD.value  # not yet let go
+    comes_to_rest(state, -math.pi / 12, 1.0, 6.0)
+    frame = state.frame(6.0)
+    assert frame['state'] == PairState.STALLED.value
+    assert 'the front and the rear wheel' in frame['detail']
+    comes_to_rest(state, -0.1, 6.0, 12.0)
+    assert state.frame(12.0)['state'] == PairState.HELD.value
+    comes_to_rest(state, -math.pi / 12, 12.0, 16.0)
+    state.take_health('simulator', says(SourceState.PAUSED, 'words'), 16.0)
+    frame = state.frame(16.0)
+    assert (frame['state'], frame['detail']) == (PairState.HELD.value, 'words')
+    assert frame['board']['nodes'][0]['message'] == 'words'  # one source for both
+
+
+def test_no_data_and_late_data_are_two_states_and_say_why():
+    state = LiveState(TrialParams())
+    frame = state.frame(0.0)
+    assert (frame['state'], frame['age']) == (PairState.NO_DATA.value, None)
+    assert 'is the source running' in frame['detail']
     state.take_joints(JointSample(START_NS, Turn(0.0, 1.0), Turn(0.1, 1.0)), 1.0)
     assert 'does phase_estimator run' in state.frame(1.1)['detail']
     state.take_phase(PhaseSample(START_NS, Turn(0.0, 1.0), Turn(0.1, 1.0), Turn(0.2, 0.0), 0), 1.2)
-    assert state.frame(1.3)['state'] == CONVERGING
-    assert state.frame(9.2)['detail'] == 'nothing has come for 8 s'
+    frame = state.frame(1.3)
+    assert (frame['state'], frame['age']) == (PairState.CONVERGING.value, 0.1)
+    frame = state.frame(9.2)
+    assert (frame['state'], frame['detail'], frame['age']) == (LATE_DATA, 'nothing has come for 8 s', 8.0)
 
 
 def test_restart_of_the_source_clears_the_charts():
@@ -196,8 +218,8 @@ def test_restart_of_the_source_clears_the_charts():
 
 def test_node_that_falls_silent_is_stale_and_its_controls_are_off():
     state = LiveState(TrialParams())
-    state.take_health('simulator', 0, 'running', 0.0)
-    state.take_health('recorder', 0, 'recording to somewhere', 0.0)
+    state.take_health('simulator', says(SourceState.RUNNING), 0.0)
+    state.take_health('recorder', says(RecorderState.RECORDING), 0.0)
     state.take_controls(RigParams(k=7.0))
     board = state.frame(1.0)['board']
     assert (board['simulated'], board['recorder'], board['recording']) == (True, True, True)
@@ -205,6 +227,17 @@ def test_node_that_falls_silent_is_stale_and_its_controls_are_off():
     board = state.frame(4.0)['board']
     assert (board['simulated'], board['recorder']) == (False, False)
     assert board['nodes'][1] == {'name': 'simulator', 'level': 'STALE', 'message': 'silent for 4 s'}
+
+
+def test_strangers_push_out_none_of_the_suite_and_take_little_room():
+    state = LiveState(TrialParams())
+    state.take_health('simulator', says(SourceState.PAUSED), 0.0)
+    for i in range(1000):
+        state.take_health(f'driver_{i}', Diagnosis(Level.OK, 'x' * 500_000, {'dump': 'y' * 500_000}), 0.1)
+    board = state.frame(0.2)['board']
+    assert board['paused']
+    assert len(board['nodes']) == STRANGERS_SHOWN + 1
+    assert len(json.dumps(board)) < 10_000
 
 
 def test_sliders_have_the_bounds_and_units_of_the_parameters():
@@ -277,7 +310,7 @@ def test_hours_take_no_more_memory_than_minutes():
             state.take_phase(PhaseSample(stamp_ns, turn, turn, Turn(0.26, 0.0), 0), now)
             if i % 3 == 0:
                 state.take_footfall(Footfall('front', stamp_ns, now, i))
-                state.take_health(f'node_{i}', 0, 'fine', now)
+                state.take_health(f'node_{i}', says('well', 'fine'), now)
                 state.notice('well', ok=True)
         return len(json.dumps(state.frame(now)))
 
@@ -291,5 +324,5 @@ def test_hours_take_no_more_memory_than_minutes():
         tracemalloc.stop()
     assert after - before < 50_000  # the monitor's history of errors may still grow, to ten thousand floats
     board = state.frame(math.inf)['board']
-    assert len(board['nodes']) == NODES_SHOWN
+    assert len(board['nodes']) == STRANGERS_SHOWN
     assert len(board['errors']) == STEPS_SHOWN

@@ -19,6 +19,7 @@ from std_srvs.srv import SetBool
 from dcdrw.recordings.recorder import Recorder
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.executables import RECORDED
+from dcdrw_msgs_py.diagnosis import STATE, RecorderState, messages_of
 from dcdrw_msgs_py.messages import to_stamp
 from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, SYNCHRONIZED, Topic
 from tests import ROOT
@@ -37,7 +38,7 @@ def start(bench, folder: Path, **parameters):
 
     def heard() -> bool:
         send(bench, joints)
-        return int(said(diagnostics).get('messages of /joint_states', 0)) > 0
+        return int(said(diagnostics).get(messages_of('/joint_states'), 0)) > 0
 
     bench.wait(heard, 'a recorded message')
     return process, joints, diagnostics
@@ -118,7 +119,7 @@ def test_full_disk_ends_the_recording_and_keeps_what_is_there(bench, tmp_path):
     bench.wait(lambda: send(bench, joints) and (tmp_path / FILE).stat().st_size > 6_000, 'a chunk')
     size = (tmp_path / FILE).stat().st_size
     resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (size + 100, size + 100))  # no file grows any more
-    bench.wait(lambda: send(bench, joints) and said(diagnostics)[''].startswith('the recording ended: '), 'the news')
+    bench.wait(lambda: send(bench, joints) and said(diagnostics).get(STATE) == RecorderState.FAILED, 'the news')
     assert said(diagnostics)[''] == f'the recording ended: File too large: {tmp_path}/bag; what came before is kept'
     assert process.poll() is None
     assert len(recorded_stamps(tmp_path / 'bag')) > 10

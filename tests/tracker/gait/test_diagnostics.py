@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from dcdrw_msgs_py.diagnosis import Level
+from dcdrw_msgs_py.diagnosis import STATE, Level, PairState, value_text
 from dcdrw_tracker.gait.cadence import CadenceStatus
 from dcdrw_tracker.gait.diagnostics import diagnose_phase, diagnose_sync, phase_text
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams
@@ -23,56 +23,70 @@ NEVER = math.inf
 
 
 @pytest.mark.parametrize(
-    ('status', 'age', 'level', 'message'),
+    ('status', 'age', 'level', 'state'),
     [
-        (SyncStatus(), NEVER, Level.STALE, 'no data yet'),
-        (SyncStatus(), math.nan, Level.STALE, 'no data yet'),
-        (STATUS._replace(synchronized=True), 2.5, Level.STALE, 'stale: no sample for 2.5 s'),
-        (SyncStatus(), 2.5, Level.STALE, 'stale: no sample for 2.5 s'),
-        (SyncStatus(), 0.1, Level.OK, 'starting afresh'),
-        (STATUS._replace(stalled=('rear',)), 0.0, Level.ERROR, 'stalled: the rear wheel'),
-        (STATUS._replace(stalled=('front', 'rear')), 0.0, Level.ERROR, 'stalled: the front and the rear wheel'),
-        (STATUS._replace(slipped=True, step_difference=2), 0.0, Level.WARN, 'slipped a step: n = 2'),
-        (STATUS._replace(lost=True), 0.0, Level.WARN, 'lost synchronization: error -2.0 %'),
-        (STATUS._replace(synchronized=True, steps_to_synchronization=7), 0.0, Level.OK, 'synchronized after 7 steps'),
-        (STATUS, 0.0, Level.OK, 'converging: error -2.0 %'),
+        (SyncStatus(), NEVER, Level.STALE, PairState.NO_DATA),
+        (SyncStatus(), math.nan, Level.STALE, PairState.NO_DATA),
+        (STATUS._replace(synchronized=True), 2.5, Level.STALE, PairState.NO_DATA),
+        (SyncStatus(), 2.5, Level.STALE, PairState.NO_DATA),
+        (STATUS._replace(held=True), 0.0, Level.OK, PairState.HELD),
+        (STATUS._replace(stalled=('rear',)), 0.0, Level.ERROR, PairState.STALLED),
+        (STATUS._replace(slipped=True, step_difference=2), 0.0, Level.WARN, PairState.SLIPPED),
+        (STATUS._replace(lost=True), 0.0, Level.WARN, PairState.LOST),
+        (STATUS._replace(synchronized=True, steps_to_synchronization=7), 0.0, Level.OK, PairState.SYNCHRONIZED),
+        (STATUS, 0.0, Level.OK, PairState.CONVERGING),
     ],
 )
-def test_each_state_has_its_own_level_and_message(status: SyncStatus, age: float, level: Level, message: str) -> None:
+def test_each_state_has_its_own_level_and_message(
+    status: SyncStatus, age: float, level: Level, state: PairState
+) -> None:
     diagnosis = diagnose_sync(status, age, 1.0)
-    assert diagnosis.level == level
-    assert diagnosis.message.startswith(message)
+    assert (diagnosis.level, diagnosis.state(PairState)) == (level, state)
+    assert diagnosis.message
 
 
-def test_the_keys_of_the_contract_are_there() -> None:
-    values = diagnose_sync(STATUS, 0.01, 1.0).values
-    assert {
-        key: values[key]
-        for key in (
-            'phase',
-            'error',
-            'n',
-            'steps to synchronization',
-            'rate in',
-            'gaps',
-            'age of the last sample',
-            'per-step convergence ratio',
-        )
-    } == {
-        'phase': '48.0 % of a step, 24.0 % of a stride',
-        'error': '-2.0 % (-0.60°)',
+def test_a_person_reads_what_is_wrong() -> None:
+    for status, age, message in (
+        (STATUS._replace(synchronized=True), 2.5, 'stale: no sample for 2.5 s'),
+        (STATUS._replace(stalled=('front', 'rear')), 0.0, 'stalled: the front and the rear wheel'),
+        (STATUS._replace(slipped=True, step_difference=2), 0.0, 'slipped a step: n = 2'),
+        (STATUS._replace(lost=True), 0.0, 'lost synchronization: error -2.0 %'),
+        (STATUS._replace(synchronized=True, steps_to_synchronization=7), 0.0, 'synchronized after 7 steps'),
+    ):
+        assert diagnose_sync(status, age, 1.0).message.startswith(message)
+
+
+def test_the_keys_of_the_contract_are_there_with_bare_numbers_and_the_unit_in_the_key() -> None:
+    diagnosis = diagnose_sync(STATUS, 0.01, 1.0)
+    assert {key: value_text(value) for key, value in diagnosis.values.items()} == {
+        'state': 'converging',
+        'phase [%]': '48',
+        'phase of a stride [%]': '24',
+        'error [%]': '-2',
+        'error [deg]': '-0.6',
+        'lowest error within the last step [%]': '-3',
+        'highest error within the last step [%]': '2.5',
         'n': '0',
-        'steps to synchronization': 'unknown',
-        'rate in': '200.0 Hz',
-        'gaps': '2 (3 samples lost, longest 0.020 s)',
-        'age of the last sample': '0.010 s',
-        'per-step convergence ratio': '0.900',
+        'steps': '12',
+        'steps to synchronization': 'nan',
+        'initial phase [%]': '21.6',
+        'per-step convergence ratio': '0.9',
+        'slipped steps': '0',
+        'times synchronization was lost': '0',
+        'restarts of the source': '0',
+        'rate in [Hz]': '200',
+        'gaps': '2',
+        'samples lost': '3',
+        'longest gap [s]': '0.02',
+        'age of the last sample [s]': '0.01',
     }
 
 
-def test_nothing_known_reads_as_unknown() -> None:
-    values = diagnose_sync(SyncStatus(), NEVER, 1.0).values
-    assert all('nan' not in value and 'inf' not in value for value in values.values())
+def test_every_figure_reads_as_a_number_whatever_is_known() -> None:
+    for status, age in ((SyncStatus(), NEVER), (STATUS, 0.1)):
+        diagnosis = diagnose_sync(status, age, 1.0)
+        for key in diagnosis.values.keys() - {STATE}:
+            float(value_text(diagnosis.values[key]))
 
 
 def test_keys_stay_and_keep_their_order() -> None:
@@ -92,7 +106,7 @@ def test_the_estimator_says_that_n_may_be_off() -> None:
     diagnosis = diagnose_phase(status, 0.0, 1.0)
     assert diagnosis.level == Level.WARN
     assert diagnosis.message == 'n may be off: a gap of up to 1.00 s may hide a step'
-    assert diagnosis.values['n is certain'] == 'false'
+    assert diagnosis.values['n is certain'] is False
 
 
 def test_the_estimator_says_why_it_refuses_every_sample() -> None:
@@ -102,7 +116,7 @@ def test_the_estimator_says_why_it_refuses_every_sample() -> None:
     diagnosis = diagnose_phase(estimator.status(), NEVER, 1.0)
     assert diagnosis.level == Level.STALE
     assert 'front_joint' in diagnosis.message
-    assert diagnosis.values['samples refused: unreadable'] == '1'
+    assert diagnosis.values['samples refused: unreadable'] == 1
     tracking = estimator.status()._replace(accepted=3, refusal=None)
     assert diagnose_phase(tracking, 0.1, 1.0).level == Level.OK
     assert diagnose_phase(tracking, 4.0, 1.0).message == 'stale: no sample for 4.0 s'

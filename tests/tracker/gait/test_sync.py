@@ -139,24 +139,34 @@ def test_a_wheel_that_strikes_twice_in_a_row_has_slipped_a_step() -> None:
 @pytest.mark.parametrize('wheel', ['front', 'rear'])
 def test_a_wheel_without_strikes_has_stalled_and_is_not_synchronized(wheel: str) -> None:
     monitor, _ = run(SETTLED)
-    last = SETTLED[-1]._replace(front=Turn(0.0, 0.0), rear=Turn(0.0, 0.0))
     assert monitor.status().synchronized
-    monitor = SyncMonitor(SyncParams())
-    still = last._replace(front=Turn(0.0, 0.0), rear=Turn(-0.1, 0.0), phi=Turn(ALPHA, 0.0))
-    seen = [monitor.update(still._replace(stamp_ns=START_NS + i * 10_000_000)) for i in range(400)]
-    assert monitor.status().stalled == ('front', 'rear')
-    assert not any(sync.synchronized for sync in seen if sync)
-    assert wheel in monitor.status().stalled
-
-
-def test_a_pair_that_stands_still_within_the_band_loses_synchronization() -> None:
-    monitor, _ = run(SETTLED)
     last = SETTLED[-1]
-    still = last._replace(front=Turn(last.front.angle, 0.0), rear=Turn(last.rear.angle, 0.0))
-    for i in range(1, 400):
-        monitor.update(still._replace(stamp_ns=last.stamp_ns + i * 10_000_000))
+    stands = {wheel: Turn(-ALPHA, 0.0)}
+    seen = []
+    for i in range(400):  # the other one rocks
+        rocking = {'rear' if wheel == 'front' else 'front': Turn(0.1 * math.sin(0.1 * i), math.cos(0.1 * i))}
+        seen.append(monitor.update(last._replace(stamp_ns=last.stamp_ns + (i + 1) * 10_000_000, **stands, **rocking)))
     status = monitor.status()
-    assert (status.stalled, status.synchronized, status.lost, status.restarts) == (('front', 'rear'), False, True, 0)
+    assert (status.stalled, status.held, status.synchronized) == (('front', 'rear'), False, False)
+    assert not seen[-1].synchronized
+
+
+def test_a_pair_that_is_held_is_not_stalled_and_goes_on_where_it_was() -> None:
+    half = len(SETTLED) // 2
+    before, after = SETTLED[:half], shift(SETTLED[half:], 20 * SECOND)
+    monitor, syncs = run(before)
+    assert syncs[-1].synchronized
+    last = before[-1]
+    still = last._replace(front=Turn(last.front.angle, 0.0), rear=Turn(last.rear.angle, 0.0))
+    held = [monitor.update(still._replace(stamp_ns=last.stamp_ns + i * 10_000_000)) for i in range(1, 2001)]
+    status = monitor.status()
+    assert (status.held, status.stalled, status.lost, status.slips) == (True, (), False, 0)
+    assert not held[-1].synchronized  # it does not walk
+    for phase in after:
+        monitor.update(phase)
+        assert monitor.status().stalled == ()
+    plain, _ = run(SETTLED)
+    assert monitor.status()._replace(stamp_ns=0, cadence=None) == plain.status()._replace(stamp_ns=0, cadence=None)
 
 
 @pytest.mark.parametrize(

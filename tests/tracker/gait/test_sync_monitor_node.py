@@ -77,13 +77,14 @@ def test_diagnosis_has_the_figures_of_the_contract(bench):
     bench.wait(lambda: len(diagnostics) >= 2, 'diagnostics')
     keys = {pair.key for pair in diagnostics[-1].status[0].values}
     assert keys >= {
-        'phase',
-        'error',
+        'state',
+        'phase [%]',
+        'error [%]',
         'n',
         'steps to synchronization',
-        'rate in',
+        'rate in [Hz]',
         'gaps',
-        'age of the last sample',
+        'age of the last sample [s]',
         'per-step convergence ratio',
     }
 

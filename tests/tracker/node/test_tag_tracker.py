@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dcdrw_msgs_py.camera import pinhole
-from dcdrw_msgs_py.diagnosis import Level
+from dcdrw_msgs_py.diagnosis import RATE_IN, Level
 from dcdrw_msgs_py.frame import Frame
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.tagging import TagGroup, TagParams
@@ -67,8 +67,8 @@ def test_filmed_wheels_are_tracked():
     assert np.sqrt(np.mean(np.square(speed[30:]))) < 0.1
     diagnosis = diagnose_tags(track.status(), FRESH)
     assert diagnosis[:2] == (Level.OK, 'tracking both wheels')
-    assert diagnosis.values['tags seen'] == 'front 1, rear 1'
-    assert diagnosis.values['frame rate'] == '30.0 Hz'
+    assert [diagnosis.values[f'tags of the {wheel} wheel seen'] for wheel in ('front', 'rear')] == [1, 1]
+    assert diagnosis.values[RATE_IN] == pytest.approx(30.0)
 
 
 def test_a_hidden_tag_is_a_gap_and_no_turn_is_lost():
