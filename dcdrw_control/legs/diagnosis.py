@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from dcdrw_control.legs.samples import Leg
 from dcdrw_control.legs.tracker import LegTrackerStatus
-from dcdrw_msgs_py.diagnosis import Diagnosis, Level
+from dcdrw_msgs_py.diagnosis import Diagnosis, Level, Value
 
 
 def diagnose_legs(status: LegTrackerStatus, age: float, stale_after: float) -> Diagnosis:
@@ -18,16 +18,16 @@ def diagnose_legs(status: LegTrackerStatus, age: float, stale_after: float) -> D
 
     """
     level, message = _judge(status, age, stale_after)
-    values: dict[str, str] = {}
+    values: dict[str, Value] = {}
     for leg, one in status.legs.items():
         values[f'{leg} sensor'] = one.sensor or 'none'
-        values[f'{leg} strikes'] = str(one.strikes)
-        values[f'{leg} stride [s]'] = f'{one.period:.3f}' if math.isfinite(one.period) else 'unknown'
-        values[f'{leg} strikes missed'] = str(one.missed)
-        values[f'{leg} strikes doubled'] = str(one.doubled)
-        values[f'{leg} gaps'] = str(one.gaps)
-    values |= {f'readings refused: {why}': str(count) for why, count in status.refused.items()}
-    values['age of the last reading [s]'] = f'{age:.3f}' if math.isfinite(age) else 'unknown'
+        values[f'{leg} strikes'] = one.strikes
+        values[f'{leg} stride [s]'] = one.period
+        values[f'{leg} strikes missed'] = one.missed
+        values[f'{leg} strikes doubled'] = one.doubled
+        values[f'{leg} gaps'] = one.gaps
+    values |= {f'readings refused: {why}': count for why, count in status.refused.items()}
+    values['age of the last reading [s]'] = age
     return Diagnosis(level, message, values)
 
 
