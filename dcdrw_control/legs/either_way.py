@@ -4,7 +4,7 @@ from dcdrw_control.legs.events import Event
 from dcdrw_control.legs.swing import SwingDetector
 from dcdrw_msgs_py.samples import SECOND
 
-BACKLOG_NS = 3 * SECOND
+BACKLOG_NS = 5 * SECOND
 """Events of the first strides, which are told once the sign is known, reach back so far."""
 
 

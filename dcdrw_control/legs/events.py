@@ -7,7 +7,7 @@ LIFT: Literal['lift'] = 'lift'
 STRIKE: Literal['strike'] = 'strike'
 """The foot meets the ground: heel strike, or the flat foot's contact where no heel strikes."""
 
-SHORTEST_SWING = 0.2
+SHORTEST_SWING = 0.15
 """A foot that leaves the ground for less has bounced, or slaps: even a sprinter's swing takes about 0.25 s [s]."""
 
 SHORTEST_STANCE = 0.1

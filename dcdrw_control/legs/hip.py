@@ -19,7 +19,7 @@ class HipDetector:
     """Hip angle in, lifts and strikes out: a thigh swings forward from the greatest extension to the greatest flexion.
 
     Flexion is the faster of the two, for the swing takes less time than the stance. The greatest flexion stands for
-    the heel strike, as exoskeletons use it; the heel itself strikes 5 to 10 % of a stride later.
+    the heel strike, as exoskeletons use it; the heel itself strikes up to 15 % of a stride later.
     """
 
     def __init__(self) -> None:

@@ -55,9 +55,9 @@ class ImuDetector:
         self._acceleration = acceleration
         if last_ns is None:
             return []
-        dt = (stamp_ns - last_ns) / SECOND
-        self._jumps.append((stamp_ns, jump / dt))
-        for sign, events in self._either.update(stamp_ns, self._axis.update(rate, dt)).items():
+        self._jumps.append((stamp_ns, jump))
+        turning = self._axis.update(rate, (stamp_ns - last_ns) / SECOND)
+        for sign, events in self._either.update(stamp_ns, turning).items():
             self._unjudged.extend((event.stamp_ns, sign) for event in events if event.kind == STRIKE)
         self._judge(stamp_ns)
         return self._either.tell(self._direction.sign)

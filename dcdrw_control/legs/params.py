@@ -27,6 +27,10 @@ class LegParams(NamedTuple):
     hip_joints: Annotated[
         tuple[str, ...], Quantity('names of the hips in leg_joint_states: front left and right, rear left and right')
     ] = HIPS
+    hip_lead: Annotated[
+        float,
+        Quantity('how long before the heel strikes a hip is flexed most, share of a stride', low=0.0, high=0.5),
+    ] = 0.0
     max_future: Annotated[float, Quantity('a stamp further ahead of the clock is refused', 's', low=0.0, live=True)] = (
         0.5
     )

@@ -15,6 +15,8 @@ STANDING = 1.3
 """A stance that lasts longer than this many usual ones is standing still: the phase rests until the foot lifts."""
 MISSED = 0.15
 """A strike that is overdue by more than this share of a stride was missed; it is far beyond all variability."""
+SURE = 3
+"""Swings seen before one can be overdue: the first steps of a walk are shorter than the others."""
 BOUNCE = 0.3
 """Share of the usual stance before which no foot lifts again: its strike has doubled."""
 MEMORY = 0.4
@@ -62,7 +64,7 @@ class LegPhase:
         """The sensor was silent: the phase is unknown until the next strike."""
         self._strike_ns: int | None = None
         self._lift_ns: int | None = None
-        self._assumed = False
+        self._assumed: tuple[int | None, int | None] | None = None
         self._bounce: _Bounce | None = None
         self._before = -math.inf
 
@@ -85,7 +87,7 @@ class LegPhase:
         return self._strike_ns is not None and not math.isnan(self.period)
 
     def take(self, event: Event) -> bool:
-        """Take an event, in the order of time; whether it counts as a new heel strike."""
+        """Take an event, in the order of time; whether it counts as a heel strike."""
         return self._strike(event.stamp_ns) if event.kind == STRIKE else self._lift(event.stamp_ns)
 
     def _lift(self, stamp_ns: int) -> bool:
@@ -99,18 +101,17 @@ class LegPhase:
     def _strike(self, stamp_ns: int) -> bool:
         since = self._since(self._strike_ns, stamp_ns)
         if self._assumed and since < BOUNCE * self.period:  # late, after all, and not missed
-            self._strike_ns, self._assumed = stamp_ns, False
-            self.missed -= 1
-            return False
+            self._strike_ns, self._lift_ns = self._assumed
+            self.strikes, self.missed = self.strikes - 1, self.missed - 1
         bounced = self._since(self._lift_ns, stamp_ns) < SHORTEST_SWING
-        unlifted = self._strike_ns is not None and self._lift_ns is None and not self._assumed
+        unlifted = self._strike_ns is not None and self._lift_ns is None and self._assumed is None
         if bounced or unlifted:
             self._bounce = _Bounce(self._lift_ns, stamp_ns) if self._lift_ns is not None else None
             self._lift_ns = None
             self.doubled += 1
             return False
         self._learn(stamp_ns)
-        self._strike_ns, self._lift_ns, self._assumed = stamp_ns, None, False
+        self._strike_ns, self._lift_ns, self._assumed = stamp_ns, None, None
         self.strikes += 1
         return True
 
@@ -150,11 +151,12 @@ class LegPhase:
 
     def _assume(self, stamp_ns: int) -> None:
         """Go on without a strike that was missed, once."""
-        if self._lift_ns is None or self._assumed:
+        if self._lift_ns is None or self._assumed is not None or self._swing.seen < SURE:
             return
         due_ns = self._lift_ns + round(self._usual_swing * SECOND)
         if self._since(due_ns, stamp_ns) > MISSED * self.period:
-            self._strike_ns, self._lift_ns, self._assumed = due_ns, None, True
+            self._assumed = self._strike_ns, self._lift_ns
+            self._strike_ns, self._lift_ns = due_ns, None
             self.strikes += 1
             self.missed += 1
 

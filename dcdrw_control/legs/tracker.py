@@ -127,7 +127,7 @@ class LegTracker:
             self._restart()
         elif track.stamp_ns is not None and stamp_ns - track.stamp_ns > self._silence_ns:
             track.lose()
-        track.take(reading)
+        track.take(reading, self.params.hip_lead)
         self._newest_ns = max(self._newest_ns, stamp_ns)
         heard = [one.stamp_ns for one in self._tracks.values() if one.stamp_ns is not None and self._is_heard(one)]
         due_ns = max(min(heard), self._newest_ns - PATIENCE_NS)
@@ -205,14 +205,18 @@ class _Track:
         if self._detector:
             self._detector.reset()
 
-    def take(self, reading: LegReading) -> None:
+    def take(self, reading: LegReading, hip_lead: float) -> None:
         """Take the next reading."""
         stamp_ns, _, values = reading
         kind = KIND_OF[type(values)]
         if kind != self.kind:
             self.kind, self._detector = kind, _DETECTORS[kind]()
         self.stamp_ns = stamp_ns
-        self._events += self._detector.update(stamp_ns, *values)
+        events = self._detector.update(stamp_ns, *values)
+        if kind == 'hip' and hip_lead and self.phase.known:
+            late_ns = round(hip_lead * self.phase.period * SECOND)
+            events = [event._replace(stamp_ns=event.stamp_ns + late_ns) for event in events]
+        self._events += events
 
     def strikes(self, until_ns: int) -> list[int]:
         """Go on to a time; the heel strikes on the way there."""

@@ -115,3 +115,13 @@ def test_no_more_is_published_than_the_rate_allows_but_every_strike_is():
     strikes = {strike.known_ns for strike in followed.strikes}
     assert len(stamps) <= 10 * 12 + len(strikes)
     assert strikes <= {0, *stamps} | set(sorted(strikes)[:4])
+
+
+def test_a_hip_that_is_flexed_before_the_heel_strikes_is_told_by_hip_lead():
+    lead, rate = 0.12, 100.0
+    seconds = [index / rate for index in range(1500)]
+    readings = [
+        LegReading(round(t * 1e9), LEFT, HipReading(0.35 * math.cos(math.tau * (t / PERIOD + lead)))) for t in seconds
+    ]
+    last = follow(readings, LegParams(hip_lead=lead)).updates[-1]
+    assert last.legs[LEFT].angle / math.tau % 1.0 == pytest.approx(last.stamp_ns / 1e9 / PERIOD % 1.0, abs=0.03)
