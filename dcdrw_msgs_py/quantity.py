@@ -28,10 +28,14 @@ class Quantity(NamedTuple):
     """Where the default NaN stands for a value derived from others: the rule."""
     live: bool = False
     """May change while a node runs."""
+    choices: tuple[Any, ...] = ()
+    """The only values allowed; empty where the bounds say all."""
 
     @property
     def bounds(self) -> str:
         """The allowed values in words; empty where every finite value is allowed."""
+        if self.choices:
+            return ' or '.join(map(str, self.choices))
         parts = []
         if self.above > -math.inf:
             parts.append(f'> {self.above:g}')
@@ -75,10 +79,15 @@ class Field(NamedTuple):
                 raise ValueError(f'{self.name} must be {self.requirement}, got {value!r}')
             if self.kind is int and value != int(value):
                 raise ValueError(f'{self.name} must be a whole number, got {value!r}')
-            return self.kind(value)
+            return self._chosen(self.kind(value))
         if self.kind in (bool, str) and isinstance(value, self.kind):
-            return value
+            return self._chosen(value)
         raise ValueError(f'{self.name} must be {_KIND_NAMES[self.kind]}, got {value!r}')
+
+    def _chosen(self, value: Any) -> Any:
+        if self.quantity.choices and value not in self.quantity.choices:
+            raise ValueError(f'{self.name} must be {self.quantity.bounds}, got {value!r}')
+        return value
 
     @property
     def requirement(self) -> str:

@@ -1,7 +1,7 @@
 """JointState messages as they came off the wire (CDR), decoded many at once: numpy alone, no ROS."""
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +20,8 @@ class JointBatch(NamedTuple):
     """NaN where not given for each joint."""
     error: str = ''
     """Why these messages cannot be read; empty where they can."""
+    log_ns: NDArray[np.int64] = np.empty(0, np.int64)
+    """When the recorder got each; empty where that is not known."""
 
     @property
     def messages(self) -> int:
@@ -27,24 +29,25 @@ class JointBatch(NamedTuple):
         return len(self.stamp_ns)
 
 
-def decode_joints(messages: list[bytes]) -> Iterator[JointBatch]:
-    """Decode serialized JointState messages of one length.
+def decode_joints(messages: list[bytes], log_ns: Sequence[int] = ()) -> Iterator[JointBatch]:
+    """Decode serialized JointState messages of one length; `log_ns` tells when the recorder got each.
 
     All whose bytes agree in everything but stamp and numbers have the layout of the first, and are read at once.
     """
     rows = np.frombuffer(b''.join(messages), np.uint8).reshape(len(messages), -1)
+    times = np.array(log_ns, np.int64)
     while len(rows):
         try:
             layout = _Layout(rows[0].tobytes())
         except (struct.error, UnicodeDecodeError, IndexError):
             yield _MALFORMED
-            rows = rows[1:]
+            rows, times = rows[1:], times[1:]
             continue
         fixed = rows[:, layout.fixed]
         differs = (fixed != fixed[0]).any(axis=1)
         count = int(differs.argmax()) if differs.any() else len(rows)
-        yield layout.read(rows[:count])
-        rows = rows[count:]
+        yield layout.read(rows[:count])._replace(log_ns=times[:count])
+        rows, times = rows[count:], times[count:]
 
 
 _NONE = np.empty((1, 0))

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
-from itertools import groupby
+from itertools import groupby, islice
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -114,16 +114,10 @@ class Recording(AbstractContextManager['Recording']):
 
     def joints(self, topic: str, start_ns: int | None = None, stop_ns: int | None = None) -> Iterator[JointBatch]:
         """The JointState messages of a topic, decoded many at once, and cut where the names or the frame change."""
-        messages = (data for _, _, data in self._read([topic], start_ns, stop_ns))
-        for _, group in groupby(messages, len):
-            batch: list[bytes] = []
-            for data in group:
-                batch.append(data)
-                if len(batch) == BATCH:
-                    yield from decode_joints(batch)
-                    batch = []
-            if batch:
-                yield from decode_joints(batch)
+        messages = ((log_ns, data) for _, log_ns, data in self._read([topic], start_ns, stop_ns))
+        for _, group in groupby(messages, lambda message: len(message[1])):
+            while batch := list(islice(group, BATCH)):
+                yield from decode_joints([data for _, data in batch], [log_ns for log_ns, _ in batch])
 
     def _read(self, topics: Sequence[str], start_ns: int | None, stop_ns: int | None) -> Iterator[Any]:
         connections = [c for c in self._reader.connections if c.topic in topics]

@@ -27,8 +27,9 @@ class Motion(NamedTuple):
     """Columns of one length: a row for each joint state that the estimator took, and what it made of it."""
 
     stamp_ns: Integers
+    """By the source's clock as it was first: where it was set later, that is undone."""
     rotation1: Floats
-    """ψ1 as it was measured [rad]."""
+    """ψ1 as it was measured, in rad."""
     rotation2: Floats
     coupler_length: Floats
     """D [m]; NaN, as Ḋ and F, where the source does not tell it."""
@@ -150,20 +151,23 @@ class _Trial:
         joints = self._params.phase
         error = batch.error or _missing(batch.names, (joints.front_joint, joints.rear_joint))
         if error:
-            for _ in range(batch.messages):
-                self._estimator.refuse('unreadable')
+            self._estimator.refuse('unreadable', batch.messages)
             self._received += batch.messages
             self._unreadable = error
             return
+        batch = self._dated(batch)
         front, rear = batch.names.index(joints.front_joint), batch.names.index(joints.rear_joint)
         columns = (
             batch.stamp_ns,
+            batch.log_ns if len(batch.log_ns) else np.zeros_like(batch.stamp_ns),
             *(table[:, wheel] for wheel in (front, rear) for table in (batch.position, batch.velocity)),
         )
-        rows, phases, errors, verdicts = self._follow([column.tolist() for column in columns], run_of(batch.frame))
+        rows, phases, errors, verdicts, clock_ns = self._follow(
+            [column.tolist() for column in columns], run_of(batch.frame)
+        )
         if not rows:
             return
-        taken = np.array(rows)
+        taken, (front_scale, rear_scale) = np.array(rows), joints.scales
         _, front_turns, rear_turns, phis, differences, restarts = zip(*phases, strict=True)
         if joints.coupler_joint in batch.names:
             coupler = batch.names.index(joints.coupler_joint)
@@ -172,9 +176,9 @@ class _Trial:
             known = [np.full(len(taken), math.nan)] * 3
         self._parts.append(
             [
-                batch.stamp_ns[taken],
-                batch.position[taken, front],
-                batch.position[taken, rear],
+                batch.stamp_ns[taken] - np.array(clock_ns),
+                batch.position[taken, front] * front_scale,
+                batch.position[taken, rear] * rear_scale,
                 *known,
                 *(column for turns in (front_turns, rear_turns, phis) for column in _columns(turns)),
                 np.array(differences, np.int64),
@@ -185,32 +189,52 @@ class _Trial:
         )
         self._rows += len(taken)
 
+    def _dated(self, batch: JointBatch) -> JointBatch:
+        """The same with the time of recording in place of missing stamps: zero while the wheels turn."""
+        missing = batch.stamp_ns == 0
+        if np.count_nonzero(missing) < 2 or not len(batch.log_ns) or not np.ptp(batch.position[missing], axis=0).any():
+            return batch
+        self._estimator.note_unstamped(int(np.count_nonzero(missing)))
+        return batch._replace(stamp_ns=np.where(missing, batch.log_ns, batch.stamp_ns))
+
     def _follow(
         self, columns: list[list[Any]], run: int
-    ) -> tuple[list[int], list[PhaseSample], list[float], list[bool]]:
-        """Rows that were accepted, and what came of them: phase, error and verdict."""
+    ) -> tuple[list[int], list[PhaseSample], list[float], list[bool], list[int]]:
+        """Rows that were accepted, and what came of them: phase, error, verdict, and by how much the clock was set."""
         taken: list[int] = []
         phases: list[PhaseSample] = []
         errors: list[float] = []
         verdicts: list[bool] = []
+        clocks: list[int] = []
         update, coupler = self._estimator.update, CouplerSample()
-        for row, (stamp_ns, psi1, omega1, psi2, omega2) in enumerate(zip(*columns, strict=True)):
-            made = update(JointSample(stamp_ns, Turn(psi1, omega1), Turn(psi2, omega2), coupler, run))
+        for row, (stamp_ns, log_ns, psi1, omega1, psi2, omega2) in enumerate(zip(*columns, strict=True)):
+            joints = JointSample(stamp_ns, Turn(psi1, omega1), Turn(psi2, omega2), coupler, run)
+            made = update(joints, arrival_ns=log_ns)
             if made is None:
                 continue
-            phase, footfalls = made
-            if not self._moving and moves(phase):
-                self._let_go(row, len(taken))
-            sync = self._monitor.update(phase)
-            self._last = phase
+            phase, footfalls, clock_ns, held = made
+            if clock_ns:
+                footfalls = tuple(fall._replace(stamp_ns=fall.stamp_ns - clock_ns) for fall in footfalls)
+            places = [(row, phase)]
+            if held:  # those of an earlier batch are not told
+                rows = {stamp: place for place, stamp in enumerate(columns[0][:row])}
+                places = [(rows[one.stamp_ns], one) for one in held if one.stamp_ns in rows] + places
+            for place, one in places:
+                if clock_ns:
+                    one = one._replace(stamp_ns=one.stamp_ns - clock_ns)
+                if not self._moving and moves(one):
+                    self._let_go(place, len(taken))
+                sync = self._monitor.update(one)
+                self._last = one
+                taken.append(place)
+                phases.append(one)
+                errors.append(sync.error_percent if sync else math.nan)
+                verdicts.append(bool(sync and sync.synchronized))
+                clocks.append(clock_ns)
             if footfalls:
                 self._footfalls.extend(footfalls)
-            taken.append(row)
-            phases.append(phase)
-            errors.append(sync.error_percent if sync else math.nan)
-            verdicts.append(bool(sync and sync.synchronized))
         self._received += len(columns[0])
-        return taken, phases, errors, verdicts
+        return taken, phases, errors, verdicts, clocks
 
     def _let_go(self, row: int, taken: int) -> None:
         self._moving = True

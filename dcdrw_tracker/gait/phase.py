@@ -4,11 +4,12 @@ Plain data in, plain data out: time arrives in the samples, and what is refused 
 """
 
 import math
+from collections import deque
 from itertools import pairwise
 from typing import Annotated, Literal, NamedTuple, get_args
 
 from dcdrw_msgs_py.quantity import Quantity
-from dcdrw_msgs_py.rig import FRONT, REAR, StanceDistance, WheelShape
+from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, StanceDistance, WheelShape
 from dcdrw_msgs_py.samples import Footfall, JointSample, PhaseSample, Turn
 from dcdrw_msgs_py.topics import COUPLER, FRONT_WHEEL, REAR_WHEEL
 from dcdrw_tracker.gait.cadence import Cadence, CadenceStatus
@@ -18,10 +19,27 @@ Refusal = Literal['unreadable', 'not finite', 'repeated', 'reversed', 'future', 
 """Why a sample is refused: the message lacks a wheel, a rotation is no number, the stamp stands still, goes back or
 lies ahead of the clock, or no wheel turns that fast."""
 
+Cause = Literal['announced', 'stamp', 'rotation']
+"""Why the source is taken to have started anew: it says so, its stamps went back, or its rotations jumped."""
+
+Hint = Literal['front_sign', 'rear_sign', 'unit']
+"""A parameter that is probably set wrongly, judged by how the wheels seem to turn."""
+
 LARGEST_ROTATION = 1e9
 """Beyond this a rotation is no measurement, and a double no longer tells a strike [rad]."""
+UNITS = {'rad': 1.0, 'deg': math.pi / 180.0, 'rev': math.tau}
+"""Units in which a source may give its rotations, in rad."""
+UPHILL_STEPS = 3
+"""A wheel that has taken so many more steps uphill than downhill has the wrong sign: rocking takes one."""
+REMEMBERED = 100
+"""Restarts and clock steps of which the particulars are kept."""
+LEAST_CLOCK_STEP_NS = 500_000_000
+"""A jump of the stamps by less is as good as a gap."""
+MOVING = 0.2
+"""A wheel that is slower tells nothing about the clock [rad/s]."""
 
 MaxSpeed = Annotated[float, Quantity('the fastest a wheel can turn; more is an outlier', 'rad/s', above=0.0, live=True)]
+Sign = Annotated[int, Quantity('-1 where its rotation in joint_states falls as it rolls downhill', choices=(1, -1))]
 
 
 class PhaseParams(NamedTuple):
@@ -41,9 +59,30 @@ class PhaseParams(NamedTuple):
     restart_samples: Annotated[
         int, Quantity('refused samples in a row that agree, and so make a restart of the source', low=2, live=True)
     ] = 5
+    unit: Annotated[
+        str, Quantity('unit of the rotations in joint_states; of the speeds, the same per second', choices=tuple(UNITS))
+    ] = 'rad'
+    front_sign: Sign = 1
+    rear_sign: Sign = 1
+    rollover: Annotated[
+        float,
+        Quantity(
+            'by how much a rotation jumps where the counter of its encoder rolls over',
+            'rad',
+            above=0.0,
+            derived='whole turns, and 2¹⁶ counts, are recognized',
+            live=True,
+        ),
+    ] = math.nan
     front_joint: Annotated[str, Quantity('name of the front wheel in joint_states')] = FRONT_WHEEL
     rear_joint: Annotated[str, Quantity('name of the rear wheel in joint_states')] = REAR_WHEEL
     coupler_joint: Annotated[str, Quantity('name of the coupler in joint_states')] = COUPLER
+
+    @property
+    def scales(self) -> tuple[float, float]:
+        """What makes rotations of the front and the rear joint ψ in rad."""
+        unit = UNITS[self.unit]
+        return self.front_sign * unit, self.rear_sign * unit
 
 
 class PhaseUpdate(NamedTuple):
@@ -52,6 +91,32 @@ class PhaseUpdate(NamedTuple):
     phase: PhaseSample
     footfalls: tuple[Footfall, ...]
     """Strikes since the last sample, in the order of time."""
+    clock_ns: int = 0
+    """By how much the source's clock has been stepped so far; stamps minus this run on evenly."""
+    held: tuple[PhaseSample, ...] = ()
+    """Phases of samples before it that had been held back until this one agreed."""
+
+
+class Restart(NamedTuple):
+    """The source has started anew."""
+
+    stamp_ns: int
+    """Of the first sample after it."""
+    cause: Cause
+    seconds: float
+    """From the last sample before it, by the stamps [s]."""
+    front: float
+    """By how much the rotation ψ as the source gives it jumped [rad]."""
+    rear: float
+
+
+class ClockStep(NamedTuple):
+    """The stamps have jumped, yet the motion went on: the clock of the source was set."""
+
+    stamp_ns: int
+    """Of the first sample after it."""
+    seconds: float
+    """By how much [s]."""
 
 
 class PhaseStatus(NamedTuple):
@@ -61,6 +126,7 @@ class PhaseStatus(NamedTuple):
     """Of the last sample that was accepted; 0 where there was none."""
     accepted: int
     refused: dict[Refusal, int]
+    """How many were refused for good, by the reason; with `accepted` they are all that came."""
     refusal: Refusal | None
     """Why samples are refused now; None since one was accepted."""
     cadence: CadenceStatus
@@ -69,6 +135,21 @@ class PhaseStatus(NamedTuple):
     """A gap was long enough for a step unseen: n may be off since then."""
     front_steps: int
     rear_steps: int
+    rollovers: int = 0
+    """Times that the counter of an encoder rolled over, which was made good."""
+    unstamped: int = 0
+    """Samples whose stamp was missing (zero), so that the time of their arrival took its place."""
+    clock_steps: tuple[ClockStep, ...] = ()
+    """The last of them, which were bridged: nothing was lost."""
+    restarted: tuple[Restart, ...] = ()
+    """The last of the restarts: what came before each has no common zero with what came after."""
+    hints: tuple[Hint, ...] = ()
+    """Parameters that seem to be wrong."""
+
+    @property
+    def refusals(self) -> dict[Refusal, int]:
+        """The reasons for which samples were refused, without those that did not occur."""
+        return {why: count for why, count in self.refused.items() if count}
 
 
 class PhaseEstimator:
@@ -78,6 +159,8 @@ class PhaseEstimator:
     (a recording that loops, a simulator that was reset), the source has started anew: the estimator then counts
     from the first of these, so no strike is lost. A source that numbers its runs says itself when it starts anew, and
     that no turn is lost in between.
+
+    Where the stamps jump while both wheels go on as they went, only the source's clock was set: this is bridged.
     """
 
     def __init__(self, params: PhaseParams) -> None:
@@ -85,35 +168,50 @@ class PhaseEstimator:
         self._cadence = Cadence()
         self._refused: dict[Refusal, int] = dict.fromkeys(get_args(Refusal), 0)
         self._refusal: Refusal | None = None
-        self._accepted = 0
-        self._restarts = 0
+        self._accepted = self._unstamped = self._too_fast = 0
+        self._restarts = self._rolled_before = 0
+        self._restarted: deque[Restart] = deque(maxlen=REMEMBERED)
+        self._clock_steps: deque[ClockStep] = deque(maxlen=REMEMBERED)
         self.reset()
 
     def configure(self, params: PhaseParams) -> None:
         """Take changed parameters at once; those that are not `live` hold for the rotations from the next start on."""
         self.params = params
-        self._tolerance = Tolerance(math.radians(params.hysteresis_deg), params.max_speed)
+        self._tolerance = Tolerance(math.radians(params.hysteresis_deg), params.max_speed, params.rollover)
+        self._front_scale, self._rear_scale = params.scales
+        self._scaled = params.scales != (1.0, 1.0)
 
     def reset(self) -> None:
         """Start afresh with the next sample (n = 0); the counts of samples stay."""
         self._last: JointSample | None = None
-        self._held: list[JointSample] = []
+        self._held: list[_Held] = []
+        self._clock_ns = self._arrived_ns = 0
         self._front = self._rear = Rotation(self.params.front.alpha, 0, 0.0, math.nan, self._tolerance)
         self._n_uncertain = False
 
-    def refuse(self, why: Refusal) -> None:
-        """Count a sample that is of no use; callers report what they cannot even convert (`unreadable`)."""
-        self._refused[why] += 1
+    def refuse(self, why: Refusal, samples: int = 1) -> None:
+        """Count samples that are of no use; callers report what they cannot even convert (`unreadable`)."""
+        self._refused[why] += samples
         self._refusal = why
 
-    def update(self, joints: JointSample, now_ns: int = 0) -> PhaseUpdate | None:
-        """Take the next sample; None where it is refused, which is counted.
+    def note_unstamped(self, samples: int) -> None:
+        """Count samples to which the caller gave the time of their arrival, for want of a stamp."""
+        self._unstamped += samples
+
+    def update(self, joints: JointSample, now_ns: int = 0, arrival_ns: int = 0) -> PhaseUpdate | None:
+        """Take the next sample; None where it is refused or has to wait for others, which is counted.
 
         Args:
-            joints: ψ [rad], unbounded or wrapped to a turn, and ψ̇ [rad/s], NaN where unknown.
+            joints: the rotations, unbounded or wrapped to a turn, and the speeds, NaN where unknown, both in `unit`.
             now_ns: the node's clock; 0 where it is unknown, as a simulated clock that has not started.
+            arrival_ns: when the sample arrived, by whatever clock; 0: at `now_ns`.
 
         """
+        arrival_ns = arrival_ns or now_ns
+        if self._scaled:
+            joints = joints._replace(
+                front=_scaled(joints.front, self._front_scale), rear=_scaled(joints.rear, self._rear_scale)
+            )
         stamp_ns, front, rear, _, run = joints
         if not (
             -LARGEST_ROTATION <= front.angle <= LARGEST_ROTATION and -LARGEST_ROTATION <= rear.angle <= LARGEST_ROTATION
@@ -123,32 +221,42 @@ class PhaseEstimator:
         if now_ns and stamp_ns - now_ns > self.params.max_future * 1e9:
             self.refuse('future')
             return None
-        self._cadence.tick(stamp_ns)
+        if stamp_ns == 0 and now_ns and self._is_unstamped(joints):
+            joints = joints._replace(stamp_ns=now_ns)
+            self._unstamped += 1
+            stamp_ns = now_ns
+        if self._clock_ns:
+            stamp_ns -= self._clock_ns
+            joints = joints._replace(stamp_ns=stamp_ns)
         last = self._last
         if last is None:
+            self._cadence.tick(stamp_ns)
             return self._start(joints)
         if run != last.run:
-            return self._restart([joints])
+            self._cadence.tick(stamp_ns)
+            return self._restart([_Held(joints, 'reversed', arrival_ns)], 'announced')
         elapsed_ns = stamp_ns - last.stamp_ns
+        if elapsed_ns >= LEAST_CLOCK_STEP_NS and self._may_be_clock_step(joints, elapsed_ns, arrival_ns):
+            return self._hold(joints, 'future', arrival_ns)
+        self._cadence.tick(stamp_ns)
         if elapsed_ns > 0:
             # While outliers are held, a sample that could go on from either belongs to the nearer.
-            stray = self._held[-1] if self._held and self._held[-1].stamp_ns > last.stamp_ns else None
+            stray = self._held[-1].joints if self._held and self._held[-1].why == 'outlier' else None
             if stray is None or _distance(joints, last) <= _distance(joints, stray):
                 update = self._follow(joints, elapsed_ns * 1e-9)
                 if update:
+                    self._arrived_ns = arrival_ns
                     return update
-            self.refuse('outlier')
-        elif elapsed_ns == 0 or (self._held and stamp_ns == self._held[-1].stamp_ns):
+            return self._hold(joints, 'outlier', arrival_ns)
+        if elapsed_ns == 0 or (self._held and stamp_ns == self._held[-1].joints.stamp_ns):
             self.refuse('repeated')
             return None
-        else:
-            self.refuse('reversed')
-        return self._hold(joints)
+        return self._hold(joints, 'reversed', arrival_ns)
 
     def status(self) -> PhaseStatus:
         """A snapshot."""
         return PhaseStatus(
-            stamp_ns=self._last.stamp_ns if self._last else 0,
+            stamp_ns=self._last.stamp_ns + self._clock_ns if self._last else 0,
             accepted=self._accepted,
             refused=self._refused.copy(),
             refusal=self._refusal,
@@ -157,13 +265,64 @@ class PhaseEstimator:
             n_uncertain=self._n_uncertain,
             front_steps=self._front.steps,
             rear_steps=self._rear.steps,
+            rollovers=self._rolled_before + self._front.rollovers + self._rear.rollovers,
+            unstamped=self._unstamped,
+            clock_steps=tuple(self._clock_steps),
+            restarted=tuple(self._restarted),
+            hints=self._hints(),
+        )
+
+    def _hints(self) -> tuple[Hint, ...]:
+        hints: list[Hint] = []
+        swift = self.params.unit == 'rad' and any(
+            abs(wheel.pace) > _fastest_rolling(shape)
+            for wheel, shape in ((self._front, self.params.front), (self._rear, self.params.rear))
+        )
+        if swift or self._too_fast > max(2 * self.params.restart_samples, self._accepted // 4):
+            hints.append('unit')
+        if self._front.steps <= -UPHILL_STEPS:
+            hints.append('front_sign')
+        if self._rear.steps <= -UPHILL_STEPS:
+            hints.append('rear_sign')
+        return tuple(hints)
+
+    def _is_unstamped(self, joints: JointSample) -> bool:
+        """Whether a stamp of zero is none: the wheels have turned since the last one, which was zero, too."""
+        if self._unstamped:
+            return True
+        last = self._last
+        if last is None or last.stamp_ns != 0 or last[1:3] == joints[1:3]:
+            return False
+        self.reset()  # the first sample had no time
+        self._cadence = Cadence()
+        return True
+
+    def _may_be_clock_step(self, joints: JointSample, elapsed_ns: int, arrival_ns: int) -> bool:
+        """Whether the stamps have jumped forward although both wheels have only moved on by a sample or so.
+
+        Where whole turns may not show, the samples must also have arrived without a pause.
+        """
+        period_ns = self._cadence.period_ns
+        if not period_ns or elapsed_ns <= 10 * period_ns:
+            return False
+        paused_ns = arrival_ns - self._arrived_ns if self._arrived_ns and arrival_ns else elapsed_ns
+        if (self._front.may_wrap or self._rear.may_wrap) and paused_ns > elapsed_ns // 2:
+            return False
+        held_ns = joints.stamp_ns - self._held[0].joints.stamp_ns if self._held else 0
+        return self._goes_on(joints, (period_ns + max(held_ns, 0)) * 1e-9)
+
+    def _goes_on(self, joints: JointSample, dt: float) -> bool:
+        """Whether both wheels move, and are where their pace takes them within dt."""
+        return all(
+            abs(wheel.pace) >= MOVING and wheel.is_at(turn.angle, dt, self._tolerance)
+            for wheel, turn in ((self._front, joints.front), (self._rear, joints.rear))
         )
 
     def _start(self, joints: JointSample) -> PhaseUpdate:
         stamp_ns, front, rear = joints[:3]
         self._front = Rotation(self.params.front.alpha, stamp_ns, front.angle, self._speed(front), self._tolerance)
         self._rear = Rotation(self.params.rear.alpha, stamp_ns, rear.angle, self._speed(rear), self._tolerance)
-        return PhaseUpdate(self._take(joints), ())
+        return PhaseUpdate(self._take(joints), (), self._clock_ns)
 
     def _follow(self, joints: JointSample, dt: float) -> PhaseUpdate | None:
         """Move both wheels on by a sample that is dt seconds later; None where they cannot get there."""
@@ -175,10 +334,11 @@ class PhaseEstimator:
         stamp_ns, front_raw, rear_raw, _, run = joints
         if not run and (front.may_step(dt) or rear.may_step(dt)):
             self._n_uncertain = True
-        front_strikes = front.advance(stamp_ns, front_raw.angle, front_psi, self._speed(front_raw), tolerance)
-        rear_strikes = rear.advance(stamp_ns, rear_raw.angle, rear_psi, self._speed(rear_raw), tolerance)
+        burst = self._cadence.burst
+        front_strikes = front.advance(stamp_ns, front_raw.angle, front_psi, self._speed(front_raw), tolerance, burst)
+        rear_strikes = rear.advance(stamp_ns, rear_raw.angle, rear_psi, self._speed(rear_raw), tolerance, burst)
         footfalls = self._footfalls(front_strikes, rear_strikes) if front_strikes or rear_strikes else ()
-        return PhaseUpdate(self._take(joints), footfalls)
+        return PhaseUpdate(self._take(joints), footfalls, self._clock_ns)
 
     def _take(self, joints: JointSample) -> PhaseSample:
         """The phase where the wheels are now: φ from ψ alone (contract §1)."""
@@ -192,7 +352,7 @@ class PhaseEstimator:
         phi = (front.psi / front.pitch - rear.psi / rear.pitch) % 1.0 * pitch
         phi_rate = (front.rate / front.pitch - rear.rate / rear.pitch) * pitch
         return PhaseSample(
-            joints.stamp_ns,
+            joints.stamp_ns + self._clock_ns,
             Turn(front.theta, front.rate),
             Turn(rear.theta, rear.rate),
             Turn(phi if phi < pitch else 0.0, phi_rate),
@@ -200,24 +360,121 @@ class PhaseEstimator:
             self._restarts,
         )
 
-    def _hold(self, joints: JointSample) -> PhaseUpdate | None:
-        """Keep a refused sample; start anew where enough of them agree."""
+    def _hold(self, joints: JointSample, why: Refusal, arrival_ns: int) -> PhaseUpdate | None:
+        """Refuse a sample for now; go on from it, or start anew, where enough of them agree."""
+        self.refuse(why)
         held = self._held
-        if held and not self._agree(held[-1], joints):
-            held.clear()
-        held.append(joints)
-        return self._restart(held) if len(held) >= self.params.restart_samples else None
+        if held:
+            latest = held[-1].joints
+            if self._moves_too_fast(latest, joints):
+                self._too_fast += 1
+            if not self._agree(latest, joints):
+                held.clear()
+        held.append(_Held(joints, why, arrival_ns))
+        if len(held) < self.params.restart_samples or not self._has_turned(held):
+            return None
+        if held[0].why == 'outlier':
+            return self._restart(held, 'rotation')
+        period_ns = self._cadence.period_ns
+        if self._go_on(held, period_ns):
+            return self._bridge(held, period_ns)
+        return self._adopt(held) if held[0].why == 'future' else self._restart(held, 'stamp')
 
-    def _restart(self, held: list[JointSample]) -> PhaseUpdate:
+    def _go_on(self, held: list['_Held'], period_ns: int) -> bool:
+        """Whether these samples go on from the last one as if no time but a period had passed."""
+        first, latest = held[0].joints, held[-1].joints
+        if not period_ns or not self._goes_on(first, period_ns * 1e-9):
+            return False
+        if held[0].why == 'reversed' and (self._front.wraps or self._rear.wraps):  # whole turns do not show
+            return False
+        span = (latest.stamp_ns - first.stamp_ns) * 1e-9
+        return all(
+            abs(math.remainder(there.angle - here.angle, math.tau) / span - wheel.pace) <= 0.75 * abs(wheel.pace)
+            for wheel, here, there in ((self._front, first.front, latest.front), (self._rear, first.rear, latest.rear))
+        )
+
+    def _has_turned(self, held: list['_Held']) -> bool:
+        """Whether samples by a clock that may have been set span enough time to tell whether the wheels still turn."""
+        if held[0].why == 'outlier' or not self._goes_on(held[0].joints, self._cadence.period_ns * 1e-9):
+            return True
+        span = (held[-1].joints.stamp_ns - held[0].joints.stamp_ns) * 1e-9
+        slowest = min(abs(self._front.pace), abs(self._rear.pace))
+        return slowest < MOVING or slowest * span >= 4.0 * self._tolerance.hysteresis
+
+    def _bridge(self, held: list['_Held'], period_ns: int) -> PhaseUpdate | None:
+        """Go on from samples by a clock that was set."""
+        assert self._last
+        first_ns = held[0].joints.stamp_ns
+        step_ns = first_ns - self._last.stamp_ns - period_ns
+        self._clock_steps.append(ClockStep(first_ns + self._clock_ns, step_ns * 1e-9))
+        self._clock_ns += step_ns
+        return self._adopt(
+            [one._replace(joints=one.joints._replace(stamp_ns=one.joints.stamp_ns - step_ns)) for one in held]
+        )
+
+    def _adopt(self, held: list['_Held']) -> PhaseUpdate | None:
+        """Follow samples that were held back."""
+        assert self._last
+        self._unrefuse(held)
+        phases: list[PhaseSample] = []
+        footfalls: tuple[Footfall, ...] = ()
+        for one in held:
+            dt = (one.joints.stamp_ns - self._last.stamp_ns) * 1e-9
+            self._cadence.tick(one.joints.stamp_ns)
+            if followed := self._follow(one.joints, dt):
+                phases.append(followed.phase)
+                footfalls += followed.footfalls
+            else:
+                self.refuse(one.why)
+        self._arrived_ns = held[-1].arrival_ns
+        return PhaseUpdate(phases[-1], footfalls, self._clock_ns, tuple(phases[:-1])) if phases else None
+
+    def _unrefuse(self, held: list['_Held']) -> None:
+        for one in held:
+            self._refused[one.why] -= 1
+
+    def _restart(self, held: list['_Held'], cause: Cause) -> PhaseUpdate:
+        last, first, clock_ns = self._last, held[0].joints, self._clock_ns
+        assert last
+        self._restarted.append(
+            Restart(
+                first.stamp_ns + clock_ns,
+                cause,
+                (first.stamp_ns - last.stamp_ns) * 1e-9,
+                first.front.angle - last.front.angle,
+                first.rear.angle - last.rear.angle,
+            )
+        )
+        if cause != 'announced':
+            self._unrefuse(held)
+        self._rolled_before += self._front.rollovers + self._rear.rollovers
         self.reset()
         self._restarts += 1
-        self._cadence.jump(held[-1].stamp_ns)
-        update = self._start(held[0])
+        samples = [one.joints._replace(stamp_ns=one.joints.stamp_ns + clock_ns) for one in held]
+        self._arrived_ns = held[-1].arrival_ns
+        self._cadence.jump(samples[-1].stamp_ns)
+        phases = [self._start(samples[0]).phase]
         footfalls: tuple[Footfall, ...] = ()
-        for last, joints in pairwise(held):
-            update = self._follow(joints, (joints.stamp_ns - last.stamp_ns) * 1e-9) or update
-            footfalls += update.footfalls
-        return update._replace(footfalls=footfalls)
+        for earlier, later in pairwise(samples):
+            if followed := self._follow(later, (later.stamp_ns - earlier.stamp_ns) * 1e-9):
+                phases.append(followed.phase)
+                footfalls += followed.footfalls
+            else:
+                self.refuse('outlier')
+        return PhaseUpdate(phases[-1], footfalls, 0, tuple(phases[:-1]))
+
+    def _moves_too_fast(self, earlier: JointSample, later: JointSample) -> bool:
+        """Whether both wheels seem to turn as fast as they would if degrees were taken for radians."""
+        dt = (later.stamp_ns - earlier.stamp_ns) * 1e-9
+        if self.params.unit != 'rad' or dt <= 0.0:
+            return False
+        return all(
+            self.params.max_speed < abs(there.angle - here.angle) / dt <= _fastest_rolling(shape) / UNITS['deg']
+            for shape, here, there in (
+                (self.params.front, earlier.front, later.front),
+                (self.params.rear, earlier.rear, later.rear),
+            )
+        )
 
     def _agree(self, earlier: JointSample, later: JointSample) -> bool:
         """Whether wheels can turn from one sample to the other."""
@@ -232,9 +489,29 @@ class PhaseEstimator:
     def _footfalls(self, front: list[Strike], rear: list[Strike]) -> tuple[Footfall, ...]:
         rig = self.params
         S0 = rig.front.length if math.isnan(rig.S0) else rig.S0  # before the strike with which a trial starts
-        falls = [Footfall(FRONT, stamp_ns, S0 + (n1 + 1) * rig.front.step_length, n1) for stamp_ns, n1 in front]
-        falls += [Footfall(REAR, stamp_ns, n2 * rig.rear.step_length, n2) for stamp_ns, n2 in rear]
+        clock_ns = self._clock_ns
+        falls = [
+            Footfall(FRONT, stamp_ns + clock_ns, S0 + (n1 + 1) * rig.front.step_length, n1) for stamp_ns, n1 in front
+        ]
+        falls += [Footfall(REAR, stamp_ns + clock_ns, n2 * rig.rear.step_length, n2) for stamp_ns, n2 in rear]
         return tuple(sorted(falls, key=lambda fall: fall.stamp_ns))
+
+
+class _Held(NamedTuple):
+    """A sample that is refused unless others agree with it."""
+
+    joints: JointSample
+    why: Refusal
+    arrival_ns: int
+
+
+def _scaled(turn: Turn, scale: float) -> Turn:
+    return Turn(turn.angle * scale, turn.rate * scale)
+
+
+def _fastest_rolling(shape: WheelShape) -> float:
+    """Twice the speed at which a wheel would leave the ground, ω² ℓ = g: none that rolls is faster [rad/s]."""
+    return 2.0 * math.sqrt(RigParams().gravity / shape.length)
 
 
 def _distance(one: JointSample, other: JointSample) -> float:

@@ -47,7 +47,8 @@ class PhaseEstimatorNode(Node):
         if update is None:
             return
         self._age.renew()
-        self._phase.publish(self._writer.write(update.phase))
+        for phase in (*update.held, update.phase):
+            self._phase.publish(self._writer.write(phase))
         self._phi.publish(Float64(data=update.phase.phi.angle))
         self._step_difference.publish(Int32(data=update.phase.step_difference))
         for footfall in update.footfalls:

@@ -8,6 +8,12 @@ PACE_MEMORY = 1.0
 """Time over which the mean speed is taken [s]."""
 SLOPE_WINDOW_NS = 50_000_000
 """Time over which a speed is taken that the source does not give."""
+LEAST_SLOPE_NS = 4_000_000
+"""Over a shorter time a speed is none: samples of a burst are stamped as they arrive, one right after the other."""
+LEAST_COUNT = 1e-6
+"""A finer encoder is none: rotations that are no multiples of a count [rad]."""
+COUNTER = 2**16
+"""Counts after which the usual counter of an encoder rolls over."""
 
 
 class Tolerance(NamedTuple):
@@ -17,6 +23,8 @@ class Tolerance(NamedTuple):
     """A strike counts back only when the rotation recedes by more than this [rad]."""
     max_speed: float
     """The fastest that the wheel can turn [rad/s]."""
+    rollover: float = math.nan
+    """By how much the rotation jumps where the source's counter rolls over [rad]; NaN where that is not known."""
 
 
 class Strike(NamedTuple):
@@ -51,9 +59,15 @@ class Rotation:
         self._highest = math.nextafter(alpha, 0.0)
         self._stamp_ns = stamp_ns
         self._raw = angle
-        self._turns = 0
+        self._offset = 0.0
+        """What the source has lost in whole turns, or as its counter rolled over: ψ minus the raw angle [rad]."""
+        self._count = math.inf
+        """Angle of one count of the source's encoder; infinite before the wheel has turned, 0 where there is none."""
+        self.rollovers = 0
+        """How often the source's counter has rolled over."""
         self._wraps: bool | None = False if abs(angle) > math.tau + self.pitch else None
         self._past = deque([(stamp_ns, angle)])
+        self._since_strike = 1
         self._cell = self._first_cell = math.floor((angle + alpha + 0.5 * tolerance.hysteresis) / self.pitch)
         self.steps = 0
         """n_i, since the start."""
@@ -71,6 +85,24 @@ class Rotation:
             return theta
         return -self.alpha if theta < 0.0 else self._highest
 
+    @property
+    def wraps(self) -> bool:
+        """Whether the source is known to give rotations within one turn."""
+        return bool(self._wraps)
+
+    @property
+    def may_wrap(self) -> bool:
+        """Whether the source may give rotations within one turn, for all that is known."""
+        return self._wraps is not False
+
+    def is_at(self, angle: float, dt: float, tolerance: Tolerance) -> bool:
+        """Whether a raw angle is where the pace takes the wheel within dt seconds, half of that more or less."""
+        moved = angle - self._raw
+        if self._wraps:
+            moved = math.remainder(moved, math.tau)
+        along = self.pace * dt
+        return abs(moved - along) <= 2.0 * tolerance.hysteresis + abs(along)
+
     def may_step(self, dt: float) -> bool:
         """Whether the wheel may take a whole step in this time [s]."""
         return self.speed * dt >= self.pitch
@@ -86,32 +118,64 @@ class Rotation:
         moved = angle - self._raw
         slack = 2.0 * tolerance.hysteresis
         if not self._wraps and -slack <= moved <= slack:  # in reach of any wheel: the rule, at a fast rate
-            return angle + math.tau * self._turns
+            return angle + self._offset
         fastest = tolerance.max_speed * dt
         along = min(fastest, 2.0 * self.speed * dt + self.pitch) + slack
         against = min(fastest, self.pitch) + slack
         low, high = (-against, along) if self.pace >= 0.0 else (-along, against)
-        turns = self._turns
+        lost = 0.0
         if self._wraps or (self._wraps is None and not low <= moved <= high and not self.may_step(dt)):
-            wraps = round((moved - self.pace * dt) / math.tau)
-            turns, moved = turns - wraps, moved - math.tau * wraps
-        return angle + math.tau * turns if low <= moved <= high else None
+            lost = -math.tau * round((moved - self.pace * dt) / math.tau)
+        if not low <= moved + lost <= high:
+            lost = 0.0 if self.may_step(dt) else self._rolled_over(angle, dt, tolerance)
+        return angle + (self._offset + lost) if low <= moved + lost <= high else None
 
-    def advance(self, stamp_ns: int, angle: float, psi: float, rate: float, tolerance: Tolerance) -> list[Strike]:
-        """Move on to a rotation ψ that `continued` has found; return the strikes on the way there."""
+    def _rolled_over(self, angle: float, dt: float, tolerance: Tolerance) -> float:
+        """What a counter has lost that rolled over: whole turns, 2¹⁶ counts, or all from one end to the other; or 0.
+
+        A counter that rolls over jumps against the motion, and goes on where the motion takes it.
+        """
+        moved, along = angle - self._raw, self.pace * dt
+        jump = moved - along
+        if jump * along >= 0.0:
+            return 0.0
+        slack = 2.0 * tolerance.hysteresis + 0.5 * abs(along)
+        widths = math.tau * round(abs(jump) / math.tau), COUNTER * self._count
+        for width in widths if math.isnan(tolerance.rollover) else (tolerance.rollover,):
+            if width and abs(abs(jump) - width) <= slack:
+                return math.copysign(width, -jump)
+        if abs(jump) > math.tau and abs(angle + self._raw) <= slack:
+            return -jump
+        return 0.0
+
+    def advance(
+        self, stamp_ns: int, angle: float, psi: float, rate: float, tolerance: Tolerance, burst: int = 1
+    ) -> list[Strike]:
+        """Move on to a rotation ψ that `continued` has found; return the strikes on the way there.
+
+        Where the source gives no rate, it is the slope over a time in which whole bursts arrived.
+        """
         elapsed_ns = stamp_ns - self._stamp_ns
         dt = elapsed_ns * 1e-9
         moved = psi - self.psi
-        if abs(angle - self._raw - moved) > math.pi:
-            self._wraps = True
+        turned = angle - self._raw
+        lost = moved - turned
+        if abs(lost) > math.pi:
+            within = max(abs(angle), abs(self._raw)) <= math.tau + self.pitch
+            self._wraps = within and abs(lost) < 1.5 * math.tau
+            self.rollovers += not self._wraps
+            turns = round((psi - angle) / math.tau)
+            whole = abs(psi - angle - turns * math.tau) < 1e-6
+            self._offset = math.tau * turns if whole else psi - angle
         elif abs(angle) > math.tau + self.pitch:
             self._wraps = False
+        if self._count:
+            self._count = _common_divisor(self._count, abs(turned))
         strikes = self._strikes(elapsed_ns, psi, tolerance.hysteresis)
-        self.rate = self._slope(stamp_ns, psi, moved / dt, strikes) if math.isnan(rate) else rate
+        self.rate = self._slope(stamp_ns, psi, bool(strikes), burst) if math.isnan(rate) else rate
         self.pace += (moved - self.pace * dt) / (dt if dt > PACE_MEMORY else PACE_MEMORY)
-        self.speed = max(abs(self.pace), abs(self.rate))  # the pace where the rate is NaN
+        self.speed = abs(self.pace) if math.isnan(self.rate) else max(abs(self.pace), abs(self.rate))
         self.psi, self._raw, self._stamp_ns = psi, angle, stamp_ns
-        self._turns = round((psi - angle) / math.tau) if psi != angle else 0
         return strikes
 
     def _strikes(self, elapsed_ns: int, psi: float, hysteresis: float) -> list[Strike]:
@@ -136,14 +200,30 @@ class Rotation:
         low = self._cell * self.pitch - self.alpha
         return low, low + self.pitch
 
-    def _slope(self, stamp_ns: int, psi: float, last_slope: float, strikes: list[Strike]) -> float:
-        """The mean speed of a short window that reaches back to the last strike at most: a strike changes it."""
+    def _slope(self, stamp_ns: int, psi: float, struck: bool, burst: int) -> float:
+        """The mean speed of a short window, as soon as may be after the last strike, which changes it."""
         past = self._past
-        if strikes:
-            past.clear()
-        elif past:
-            while len(past) > 1 and stamp_ns - past[0][0] > SLOPE_WINDOW_NS:
-                past.popleft()
-            last_slope = (psi - past[0][1]) / ((stamp_ns - past[0][0]) * 1e-9)
+        while len(past) > burst and stamp_ns - past[0][0] > SLOPE_WINDOW_NS:
+            past.popleft()
+        count = len(past)
+        since = 0 if struck else min(self._since_strike, count)
+        self._since_strike = since + 1
+        slope = math.nan
+        for back in (since, count):
+            back -= back % burst
+            if back:
+                then_ns, then = past[count - back]
+                if stamp_ns - then_ns >= LEAST_SLOPE_NS:
+                    slope = (psi - then) / ((stamp_ns - then_ns) * 1e-9)
+                    break
         past.append((stamp_ns, psi))
-        return last_slope
+        return slope
+
+
+def _common_divisor(one: float, other: float) -> float:
+    """The largest angle of which both are multiples; 0 where it is less than `LEAST_COUNT`."""
+    if math.isinf(one):
+        return other or one
+    while other > 0.1 * LEAST_COUNT:
+        one, other = other, abs(math.remainder(one, other))
+    return one if one > LEAST_COUNT else 0.0

@@ -1,17 +1,25 @@
 import math
+import random
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from dcdrw_tracker.gait.cadence import LOOKS, Cadence
 
 MS = 1_000_000
 
 
-def tick(stamps_ms: list[int]) -> Cadence:
+def tick(stamps_ms: list[float]) -> Cadence:
     cadence = Cadence()
     for stamp in stamps_ms:
-        cadence.tick(stamp * MS)
+        cadence.tick(round(stamp * MS))
     return cadence
+
+
+def bursts(count: int, size: int, every: float, apart: float = 0.1) -> list[float]:
+    """Stamps [ms] of samples that arrive `size` at a time."""
+    return [every * (sample // size) + apart * (sample % size) for sample in range(count)]
 
 
 def test_the_rate_is_learned_from_the_stamps() -> None:
@@ -29,6 +37,15 @@ def test_lost_samples_do_not_spoil_the_period() -> None:
     assert tick([5 * sample for sample in range(400) if sample % 4]).status().rate == pytest.approx(200.0)
 
 
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**32), st.floats(0.0, 0.3))
+def test_every_sample_lost_at_random_is_counted(seed: int, share: float) -> None:
+    kept = [True] + [random.Random(seed * 4001 + sample).random() >= share for sample in range(1, 3999)] + [True]
+    status = tick([5.0 * sample for sample, here in enumerate(kept) if here]).status()
+    assert status.rate == pytest.approx(200.0)
+    assert status.lost == kept.count(False)
+
+
 def test_jitter_is_no_gap() -> None:
     assert tick([10 * sample + (sample % 3) for sample in range(300)]).status().gaps == 0
 
@@ -44,3 +61,33 @@ def test_a_jump_of_the_source_is_no_gap() -> None:
     cadence.jump(5000 * MS)
     cadence.tick(5005 * MS)
     assert cadence.status().gaps == 0
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(2, 16), st.integers(0, 200), st.floats(0.005, 0.05))
+def test_bursts_are_no_gaps(size: int, more: int, apart: float) -> None:
+    cadence = tick(bursts(400 + more, size, 5.0 * size, apart))
+    assert (cadence.status().gaps, cadence.status().lost, cadence.burst) == (0, 0, size)
+    assert cadence.status().rate == pytest.approx(200.0)
+    assert cadence.period_ns == 5 * MS
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(2, 8), st.integers(20, 60), st.integers(1, 5))
+def test_bursts_that_are_lost_are_counted(size: int, first: int, count: int) -> None:
+    stamps = bursts(100 * size, size, 20.0)
+    status = tick(stamps[: first * size] + stamps[(first + count) * size :]).status()
+    assert (status.gaps, status.lost) == (1, count * size)
+
+
+def test_bursts_of_various_sizes_are_no_gaps() -> None:
+    """Samples at 200 Hz, fetched every 16 ms, give or take 4."""
+    jitter, stamps, fetched = random.Random(1), list[float](), 0
+    for fetch in range(1, 600):
+        at = 16.0 * fetch + jitter.uniform(-4.0, 4.0)
+        fresh = range(fetched, int(at / 5.0) + 1)
+        stamps += [at + 0.05 * place for place in range(len(fresh))]
+        fetched += len(fresh)
+    status = tick(stamps).status()
+    assert status.rate == pytest.approx(200.0, rel=0.1)
+    assert status.lost < 0.01 * len(stamps)
