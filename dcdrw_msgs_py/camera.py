@@ -1,4 +1,4 @@
-"""A camera: pinhole with lens distortion, as ROS's camera calibration writes it (camera_info)."""
+"""A camera: pinhole or fisheye with lens distortion, as the calibrations of ROS, OpenCV and kalibr write it."""
 
 import math
 from collections.abc import Sequence
@@ -6,13 +6,31 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import yaml
 from numpy.typing import ArrayLike, NDArray
+
+from dcdrw_msgs_py.quantity import suggestion
+from dcdrw_msgs_py.yaml_file import read_yaml, yaml_text
 
 Floats = NDArray[np.float64]
 
-MODELS = {'plumb_bob': 5, 'rational_polynomial': 8}
-"""Distortion models, and how many coefficients each has: k1, k2, p1, p2, k3, then k4, k5, k6."""
+MODELS = {'plumb_bob': (5,), 'rational_polynomial': (8, 12, 14), 'equidistant': (4,)}
+"""Distortion models, and how many coefficients each may have.
+
+Brown's are k1, k2, p1, p2, k3, then k4, k5, k6 (rational), then s1 to s4 (thin prism) and τx, τy (tilted sensor), as
+OpenCV has them; those of a fisheye, the polynomial in θ of Kannala and Brandt, are k1 to k4.
+"""
+ALIASES = {
+    '': 'plumb_bob',
+    'none': 'plumb_bob',
+    'radtan': 'plumb_bob',
+    'radial-tangential': 'plumb_bob',
+    'rational': 'rational_polynomial',
+    'thin_prism': 'rational_polynomial',
+    'fisheye': 'equidistant',
+    'equi': 'equidistant',
+    'kannala_brandt4': 'equidistant',
+}
+"""Names that others give to the models."""
 NEWTON_STEPS = 20
 """Enough to invert any lens that can be inverted at all; three do for a usual one."""
 RAY_TOLERANCE = 1e-10
@@ -27,12 +45,17 @@ class Camera(NamedTuple):
     matrix: Floats
     """Intrinsic matrix K, (3, 3)."""
     distortion: Floats
-    """Coefficients, (5,) or (8,); see `MODELS`."""
+    """Coefficients, as many as their model has; see `MODELS`."""
 
     @property
     def model(self) -> str:
         """Name of the distortion model."""
-        return next(name for name, count in MODELS.items() if count == len(self.distortion))
+        return next(name for name, counts in MODELS.items() if len(self.distortion) in counts)
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether what is straight stays so in the picture."""
+        return self.model != 'equidistant' and not self.distortion.any()
 
     def project(self, points: ArrayLike) -> Floats:
         """Pixels (N, 2) of points (N, 3) in the optical frame; NaN for what is not in front of the camera."""
@@ -45,25 +68,71 @@ class Camera(NamedTuple):
         """Undistorted x/z and y/z, (N, 2), of pixels (N, 2); NaN for what this lens never projects there."""
         seen = np.asarray(pixels, float).reshape(-1, 2) - self.matrix[:2, 2]
         bent = np.linalg.solve(self.matrix[:2, :2], seen.T)
-        return np.asarray(_undistort(bent, self.distortion).T if self.distortion.any() else bent.T)
+        return np.asarray((bent if self.is_straight else _undistort(bent, self.distortion)).T)
 
 
 def _distort(straight: Floats, coefficients: Floats) -> Floats:
-    """Where the lens puts undistorted coordinates (2, N): Brown's model, rational where it has 8 coefficients."""
-    k1, k2, p1, p2, k3, k4, k5, k6 = (*coefficients, 0.0, 0.0, 0.0)[:8]
+    """Where the lens puts undistorted coordinates (2, N)."""
+    if len(coefficients) == 4:
+        return _distort_fisheye(straight, coefficients)
+    k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tau_x, tau_y = np.pad(coefficients, (0, 14 - len(coefficients)))
     x, y = straight
     r2 = x * x + y * y
     radial = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)))
-    return np.stack(
+    bent = np.stack(
         (
-            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x) + r2 * (s1 + r2 * s2),
+            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y + r2 * (s3 + r2 * s4),
         )
     )
+    return _tilted(bent, tau_x, tau_y) if tau_x or tau_y else bent
+
+
+def _tilted(bent: Floats, tau_x: float, tau_y: float) -> Floats:
+    """The same on a sensor that is tilted about x and y [rad]."""
+    (cx, sx), (cy, sy) = ((math.cos(tau), math.sin(tau)) for tau in (tau_x, tau_y))
+    turn = np.array(((cy, sx * sy, -cx * sy), (0.0, cx, sx), (sy, -sx * cy, cx * cy)))
+    onto = np.array(((turn[2, 2], 0.0, -turn[0, 2]), (0.0, turn[2, 2], -turn[1, 2]), (0.0, 0.0, 1.0)))
+    x, y, z = onto @ turn @ np.stack((*bent, np.ones_like(bent[0])))
+    return np.stack((x / z, y / z))
+
+
+def _distort_fisheye(straight: Floats, coefficients: Floats) -> Floats:
+    """θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸) from the axis, where a pinhole puts tan θ."""
+    r = np.hypot(*straight)
+    theta = np.arctan(r)
+    with np.errstate(invalid='ignore'):
+        return straight * np.where(r > 0.0, _seen_angle(theta, coefficients)[0] / r, 1.0)
+
+
+def _seen_angle(theta: Floats, coefficients: Floats) -> tuple[Floats, Floats]:
+    """The angle θ as a fisheye shows it, and its derivative."""
+    t2 = theta * theta
+    value, slope = np.ones_like(theta), np.ones_like(theta)
+    for power, k in enumerate(coefficients, start=1):
+        value = value + k * t2**power
+        slope = slope + (2 * power + 1) * k * t2**power
+    return theta * value, slope
+
+
+def _undistort_fisheye(bent: Floats, coefficients: Floats) -> Floats:
+    """Inverse of `_distort_fisheye`, by Newton's method on θ; NaN from 90° on, and where no θ is shown there."""
+    seen = np.hypot(*bent)
+    theta = np.minimum(seen, 0.5 * math.pi)
+    for _ in range(NEWTON_STEPS):
+        value, slope = _seen_angle(theta, coefficients)
+        with np.errstate(divide='ignore', invalid='ignore'):
+            theta = theta - (value - seen) / slope
+    value, slope = _seen_angle(theta, coefficients)
+    good = (np.abs(value - seen) <= RAY_TOLERANCE) & (theta >= 0.0) & (theta < 0.5 * math.pi) & (slope > 0.0)
+    with np.errstate(invalid='ignore'):
+        return np.where(good, bent * np.where(seen > 0.0, np.tan(theta) / seen, 1.0), np.nan)
 
 
 def _undistort(bent: Floats, coefficients: Floats) -> Floats:
     """Inverse of `_distort`, by Newton's method."""
+    if len(coefficients) == 4:
+        return _undistort_fisheye(bent, coefficients)
     straight, step = bent.copy(), 1e-6
     error = _distort(straight, coefficients) - bent
     for _ in range(NEWTON_STEPS):
@@ -117,58 +186,151 @@ def make_camera(
             f'{source}: the focal lengths in camera_matrix.data must be > 0, got {K[0, 0]:g} and '
             f'{K[1, 1]:g}; calibrate the camera first (ros2 run camera_calibration cameracalibrator)'
         )
-    if model not in MODELS:
+    return Camera(int(width), int(height), K, _coefficients(model, np.array(coefficients, float).ravel(), source))
+
+
+def _coefficients(model: str, D: Floats, source: str) -> Floats:
+    """As many coefficients as the model has; what is left out is zero."""
+    name = ALIASES.get(model.lower(), model.lower())
+    if name not in MODELS:
         raise ValueError(f'{source}: distortion_model must be {" or ".join(MODELS)}, got {model!r}')
-    D = np.array(coefficients, float).ravel()
-    if len(D) not in (0, 4, MODELS[model]) or not np.isfinite(D).all():  # 4: k3 left out
+    if not np.isfinite(D).all():
+        raise ValueError(f'{source}: distortion_coefficients.data must be finite numbers, got {D.tolist()}')
+    if name == 'equidistant':
+        if len(D) not in (0, 4) and D[4:].any():
+            raise ValueError(f'{source}: an equidistant (fisheye) lens has 4 coefficients, got {D.tolist()}')
+        return np.pad(D[:4], (0, 4 - len(D[:4])))
+    if len(D) not in (0, 2, 4, 5, 8, 12, 14):
         raise ValueError(
-            f'{source}: distortion_coefficients.data of {model} must be {MODELS[model]} finite numbers, '
-            f'got {D.tolist()}'
+            f'{source}: distortion_coefficients.data of {name} must be 4, 5, 8, 12 or 14 numbers, got {D.tolist()}'
         )
-    return Camera(int(width), int(height), K, np.pad(D, (0, MODELS[model] - len(D))))
+    if name == 'plumb_bob' and not D[5:].any():  # OpenCV takes any lens with more for a rational one
+        return np.pad(D[:5], (0, 5 - len(D[:5])))
+    return np.pad(D, (0, max(8 - len(D), 0)))
 
 
 def read_camera(path: Path) -> Camera:
-    """Read a calibration file, as `camera_calibration` writes it.
+    """Read a calibration file, as `camera_calibration` (ROS), OpenCV's FileStorage or kalibr writes it.
 
     Raises:
-        ValueError: not such a file; the key that is missing or wrong is named.
+        ValueError: not such a file; the key that is missing, wrong or unknown is named.
         OSError: the file cannot be read.
 
     """
-    try:
-        content = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ValueError(f'{path} is not YAML: {" ".join(str(error).split())}') from None
+    content = read_yaml(path)
+    if not isinstance(content, dict):
+        content = {}
+    cameras = [name for name in content if str(name).startswith('cam') and str(name)[3:].isdecimal()]
+    if len(cameras) > 1:
+        raise ValueError(f'{path} has several cameras, {", ".join(cameras)}: keep the one that looks at the wheels')
+    return _kalibr(content[cameras[0]], path) if cameras else _calibration(content, path)
 
-    def entry(name: str, kind: type) -> Any:
-        value: Any = content
-        for key in name.split('.'):
-            if not isinstance(value, dict) or key not in value:
-                raise ValueError(f'{path} has no {name}: is it a camera_info file, as camera_calibration writes it?')
-            value = value[key]
-        numbers = not isinstance(value, list) or all(isinstance(item, (int, float)) for item in value)
-        if not isinstance(value, kind) or not numbers:
-            raise ValueError(f'{path}: {name} must be {_KINDS[kind]}, got {value!r}')
-        return value
 
-    return make_camera(
-        entry('image_width', int),
-        entry('image_height', int),
-        entry('camera_matrix.data', list),
-        entry('distortion_model', str),
-        entry('distortion_coefficients.data', list),
-        str(path),
+_NAMES = {
+    'image_width': ('image_width', 'width'),
+    'image_height': ('image_height', 'height'),
+    'camera_matrix': ('camera_matrix', 'M', 'K', 'cameraMatrix'),
+    'distortion_model': ('distortion_model',),
+    'distortion_coefficients': ('distortion_coefficients', 'D', 'distCoeffs', 'dist_coeffs', 'dist_coeff'),
+}
+"""What is read of a file by ROS, and by what names OpenCV's users know it."""
+_BESIDE = (
+    *(
+        'camera_name',
+        'rectification_matrix',
+        'projection_matrix',
+        'binning_x',
+        'binning_y',
+        'roi',
+        'header',
+        'frame_id',
+    ),
+    *('calibration_time', 'nframes', 'nr_of_frames', 'flags', 'fisheye_model', 'board_width', 'board_height'),
+    *('square_size', 'marker_size', 'aspectRatio', 'avg_reprojection_error', 'reprojection_error'),
+    *('per_view_reprojection_errors', 'extrinsic_parameters', 'image_points', 'grid_points', 'rms', 'R', 'P'),
+)
+"""What else these files hold."""
+_MATRIX = ('rows', 'cols', 'data', 'dt')
+_KALIBR = ('camera_model', 'intrinsics', 'distortion_model', 'distortion_coeffs', 'resolution')
+_KALIBR_BESIDE = ('rostopic', 'cam_overlaps', 'T_cam_imu', 'T_imu_cam', 'T_cn_cnm1', 'timeshift_cam_imu')
+
+
+def _refuse_unknown(content: dict[Any, Any], known: Sequence[str], path: Path) -> None:
+    for key in content:
+        if key not in known:
+            raise ValueError(f'{path}: {key} is no key of a camera file{suggestion(key, known)}')
+
+
+def _calibration(content: dict[Any, Any], path: Path) -> Camera:
+    _refuse_unknown(content, [*(name for names in _NAMES.values() for name in names), *_BESIDE], path)
+
+    def value(name: str) -> Any:
+        return next((content[key] for key in _NAMES[name] if key in content), None)
+
+    def data(name: str) -> list[Any]:
+        held = value(name)
+        if isinstance(held, dict):
+            _refuse_unknown(held, _MATRIX, path)
+            held = held.get('data')
+        if held is None:
+            raise _missing(f'{name}.data', path)
+        return _numbers(held, f'{name}.data', path)
+
+    width, height = (_whole(value(name), name, path) for name in ('image_width', 'image_height'))
+    model = value('distortion_model')
+    if model is None:  # as camera_calibration_parsers takes it; OpenCV's sample says it in its own way
+        model = 'equidistant' if content.get('fisheye_model') else ''
+        model = model or ('rational_polynomial' if len(data('distortion_coefficients')) > 5 else 'plumb_bob')
+    if not isinstance(model, str):
+        raise ValueError(f'{path}: distortion_model must be a string, got {model!r}')
+    return make_camera(width, height, data('camera_matrix'), model, data('distortion_coefficients'), str(path))
+
+
+def _kalibr(content: Any, path: Path) -> Camera:
+    content = content if isinstance(content, dict) else {}
+    _refuse_unknown(content, (*_KALIBR, *_KALIBR_BESIDE), path)
+    for name in _KALIBR:
+        if name not in content:
+            raise _missing(name, path)
+    if content['camera_model'] != 'pinhole':
+        raise ValueError(f'{path}: camera_model must be pinhole, got {content["camera_model"]!r}')
+    intrinsics, resolution, coefficients = (
+        _numbers(content[name], name, path) for name in ('intrinsics', 'resolution', 'distortion_coeffs')
     )
+    if len(intrinsics) != 4 or len(resolution) != 2:
+        raise ValueError(f'{path}: intrinsics must be fx, fy, cx, cy, and resolution width and height')
+    fx, fy, cx, cy = intrinsics
+    width, height = (_whole(pixels, 'resolution', path) for pixels in resolution)
+    matrix = (fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0)
+    return make_camera(width, height, matrix, str(content['distortion_model']), coefficients, str(path))
 
 
-_KINDS: dict[type, str] = {int: 'a whole number', list: 'a list of numbers', str: 'a string'}
+def _missing(name: str, path: Path) -> ValueError:
+    return ValueError(f'{path} has no {name}: is it a camera_info file, as camera_calibration writes it?')
+
+
+def _whole(value: Any, name: str, path: Path) -> int:
+    if value is None:
+        raise _missing(name, path)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or value != value // 1:
+        raise ValueError(f'{path}: {name} must be a whole number, got {value!r}')
+    return int(value)
+
+
+def _numbers(value: Any, name: str, path: Path) -> list[Any]:
+    """A list of numbers, or of rows of them."""
+    flat = (
+        [item for row in value for item in (row if isinstance(row, list) else [row])] if isinstance(value, list) else []
+    )
+    if not isinstance(value, list) or any(isinstance(x, bool) or not isinstance(x, (int, float)) for x in flat):
+        raise ValueError(f'{path}: {name} must be a list of numbers, got {value!r}')
+    return flat
 
 
 def write_camera(path: Path, camera: Camera, name: str = 'camera') -> None:
     """Write the file that `read_camera` and ROS's camera drivers read."""
     Path(path).write_text(
-        yaml.safe_dump(
+        yaml_text(
             {
                 'image_width': camera.width,
                 'image_height': camera.height,
@@ -178,8 +340,7 @@ def write_camera(path: Path, camera: Camera, name: str = 'camera') -> None:
                 'distortion_coefficients': _matrix(camera.distortion[None]),
                 'rectification_matrix': _matrix(np.eye(3)),
                 'projection_matrix': _matrix(np.pad(camera.matrix, ((0, 0), (0, 1)))),
-            },
-            sort_keys=False,
+            }
         ),
         encoding='utf-8',
     )

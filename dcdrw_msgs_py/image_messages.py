@@ -15,16 +15,36 @@ from dcdrw_msgs_py.messages import stamp_ns, to_stamp
 from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.samples import PoseSample
 
-ENCODINGS = {
-    'mono8': (1, 1),
-    '8UC1': (1, 1),
-    'mono16': (1, 2),
-    '16UC1': (1, 2),
-    'bgr8': (3, 1),
-    '8UC3': (3, 1),
-    'rgb8': (3, 1),
+_CHANNELS = {
+    'mono': 1,
+    'rgb': 3,
+    'bgr': 3,
+    'rgba': 4,
+    'bgra': 4,
+    **dict.fromkeys(('bayer_rggb', 'bayer_bggr', 'bayer_gbrg', 'bayer_grbg'), 1),
 }
-"""Encodings that are read: how many channels each has, and how many bytes a channel."""
+PIXELS = {
+    **{f'{order}{bits}': (order, count, bits // 8) for order, count in _CHANNELS.items() for bits in (8, 16)},
+    **{
+        f'{bits}{kind}C{count}': (order, count, bits // 8)
+        for bits, kind in ((8, 'U'), (16, 'U'))
+        for order, count in (('mono', 1), ('bgr', 3), ('bgra', 4))
+    },
+}
+"""Encodings of whole pixels: the order of their channels, how many there are, and how many bytes each has."""
+LUMINANCE = {
+    **dict.fromkeys(('yuv422', 'uyvy'), (1, 2)),
+    **dict.fromkeys(('yuv422_yuy2', 'yuyv', 'yuy2'), (0, 2)),
+    **dict.fromkeys(('nv12', 'nv21', 'nv24', 'i420', 'yv12'), (0, 1)),
+}
+"""Encodings of brightness and colour apart: the first byte of brightness in a row, and from one to the next.
+
+The tags are black and white: only the brightness is read. Where it stands in a plane of its own, that is the first.
+"""
+BAYER = {'bayer_rggb': 'BG', 'bayer_bggr': 'RG', 'bayer_gbrg': 'GR', 'bayer_grbg': 'GB'}
+"""What OpenCV calls these patterns: after their second row."""
+DEPTHS = (10, 12, 14)
+"""Bits that a sensor may have whose numbers are sent in words of 16."""
 
 
 def frame(message: Any) -> Frame:
@@ -39,25 +59,45 @@ def frame(message: Any) -> Frame:
 
 def _picture(message: Any) -> Picture:
     encoding, height, width, step = message.encoding, message.height, message.width, message.step
-    if encoding not in ENCODINGS:
-        raise ValueError(f'the encoding {encoding!r} is not read; let the camera send {", ".join(ENCODINGS)}')
-    channels, size = ENCODINGS[encoding]
-    row = width * channels * size
+    name = encoding if encoding in PIXELS else encoding.lower()
+    if name in LUMINANCE:
+        first, apart = LUMINANCE[name]
+        return _rows(message, height, width * apart, step)[:, first::apart]
+    if name not in PIXELS:
+        raise ValueError(
+            f'the encoding {encoding!r} is not read; let the camera send {", ".join((*PIXELS, *LUMINANCE))}'
+        )
+    order, channels, size = PIXELS[name]
+    rows = _rows(message, height, width * channels * size, step)
+    if size == 2:
+        rows = _upper_bits(rows, bool(message.is_bigendian))
+    if order == 'mono':
+        return rows
+    cv2 = opencv()
+    if order in BAYER:
+        return np.asarray(cv2.cvtColor(rows, getattr(cv2, f'COLOR_Bayer{BAYER[order]}2BGR')), np.uint8)
+    colours = rows.reshape(height, width, channels)
+    if order == 'bgr':
+        return colours
+    return np.asarray(cv2.cvtColor(colours, getattr(cv2, f'COLOR_{order.upper()}2BGR')), np.uint8)
+
+
+def _rows(message: Any, height: int, row: int, step: int) -> Picture:
+    """The rows of a message's picture, without what fills them up."""
     data = np.frombuffer(message.data, np.uint8)
     if not (row and height) or step < row or data.size < step * (height - 1) + row:
-        raise ValueError(f'{data.size} bytes in rows of {step} are no {encoding} picture of {width}x{height}')
-    rows = np.lib.stride_tricks.as_strided(data, (height, row), (step, 1), writeable=False)
-    if size == 2:  # the upper byte of each
-        return rows[:, 0 if message.is_bigendian else 1 :: 2]
-    if channels == 1:
-        return rows
-    colours = rows.reshape(height, width, channels)
-    return _swapped(colours) if encoding == 'rgb8' else colours
+        raise ValueError(
+            f'{data.size} bytes in rows of {step} are no {message.encoding} picture of {message.width}x{height}'
+        )
+    return np.lib.stride_tricks.as_strided(data, (height, row), (step, 1), writeable=False)
 
 
-def _swapped(colours: Picture) -> Picture:
-    cv2 = opencv()
-    return np.asarray(cv2.cvtColor(colours, cv2.COLOR_RGB2BGR), np.uint8)
+def _upper_bits(rows: Picture, bigendian: bool) -> Picture:
+    """The upper eight of the bits that are in use: a sensor of 10, 12 or 14 bits leaves the others of 16 empty."""
+    words = np.ascontiguousarray(rows).view('>u2' if bigendian else '<u2')
+    brightest = int(words.max())
+    bits = next((bits for bits in DEPTHS if brightest < 1 << bits), 16)
+    return (words >> (bits - 8)).astype(np.uint8)
 
 
 def compressed_frame(message: Any) -> Frame:

@@ -128,6 +128,13 @@ def lookup(params: tuple[Any, ...], name: str) -> Any:
     return value
 
 
+def suggestion(name: object, known: Iterable[str]) -> str:
+    """The end of a message on a name that is unknown: the nearest that is known, or all."""
+    names = list(known)
+    near = get_close_matches(str(name), names, n=1)
+    return f'; did you mean {near[0]}?' if near else f'; known are {", ".join(names)}'
+
+
 def build(params: type[Params], values: Mapping[str, Any], source: str = '') -> Params:
     """Make a parameter set from dotted names; what is absent takes its default.
 
@@ -140,9 +147,7 @@ def build(params: type[Params], values: Mapping[str, Any], source: str = '') -> 
     known = {field.name: field for field in fields(params)}
     for name in values:
         if name not in known:
-            near = get_close_matches(name, known, n=1)
-            hint = f'; did you mean {near[0]}?' if near else f'; known are {", ".join(known)}'
-            raise ValueError(f'{name} is not a parameter{where}{hint}')
+            raise ValueError(f'{name} is not a parameter{where}{suggestion(name, known)}')
     try:
         flat = {name: field.coerce(values.get(name, field.default)) for name, field in known.items()}
     except ValueError as error:

@@ -8,8 +8,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import yaml
-
 from dcdrw.arguments import number, positive
 from dcdrw.progress import Progress, interruptible
 from dcdrw.suite.parameter_file import add_rig_options, given, read_parameter_file
@@ -19,6 +17,7 @@ from dcdrw_msgs_py.quantity import Field, Params, build, check, fields, flatten
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelShape
 from dcdrw_msgs_py.samples import SECOND, CouplerSample, JointSample, Turn
 from dcdrw_msgs_py.tagging import TagParams
+from dcdrw_msgs_py.yaml_file import yaml_text
 from dcdrw_sim.camera.render import LookParams, Renderer
 from dcdrw_sim.camera.scene import Footing, SceneParams, ViewParams
 from dcdrw_sim.model.presets import PRESETS
@@ -272,4 +271,4 @@ def _write_rig(path: Path, params: FilmParams) -> None:
         'roll_deg': params.view.roll_deg,
     }
     content = {'/**': {'ros__parameters': values}}
-    path.write_text(yaml.safe_dump(content, sort_keys=False, allow_unicode=True), encoding='utf-8')
+    path.write_text(yaml_text(content), encoding='utf-8')

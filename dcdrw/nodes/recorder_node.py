@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import yaml
 from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
@@ -28,6 +27,7 @@ from dcdrw_msgs_py.diagnosis import STATE, Diagnosis, Level, RecorderState, mess
 from dcdrw_msgs_py.node import Parameters, message_type, report, run, steady_clock
 from dcdrw_msgs_py.quantity import fields
 from dcdrw_msgs_py.topics import SAMPLE_DEPTH, Topic
+from dcdrw_msgs_py.yaml_file import yaml_text
 
 LOOK_SECONDS = 0.5
 """How often the recorder looks who publishes, and who has not told its parameters yet."""
@@ -188,7 +188,7 @@ class RecorderNode(Node):
                 if value == value
             }
         }  # NaN: derived from others
-        text = yaml.safe_dump(self._parameters, sort_keys=False, allow_unicode=True)
+        text = yaml_text(self._parameters)
         self.recorder.about['parameters'] = text
         try:
             write_whole(self.recorder.folder / PARAMETERS, text)

@@ -8,7 +8,6 @@ from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
 
-import yaml
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
@@ -25,7 +24,8 @@ from mcap.records import (
 )
 from mcap.stream_reader import get_chunk_data_stream
 
-from dcdrw.recordings.recorder import INFORMATION, METADATA, RecordedTopic, Span, bag_metadata, write_whole, yaml_text
+from dcdrw.recordings.recorder import INFORMATION, METADATA, RecordedTopic, Span, bag_metadata, write_whole
+from dcdrw_msgs_py.yaml_file import parse_yaml, read_yaml, yaml_text
 
 _MAGIC = b'\x89MCAP0\r\n'
 _HEAD = struct.Struct('<BQ')
@@ -82,8 +82,8 @@ def _renew_metadata(file: Path, index: '_Index') -> None:
         return
     path = file.parent / METADATA
     about: dict[str, str] = {}
-    with suppress(OSError, yaml.YAMLError, KeyError, TypeError):
-        about = yaml.safe_load(path.read_text(encoding='utf-8'))[INFORMATION]['custom_data'] or {}
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        about = read_yaml(path)[INFORMATION]['custom_data'] or {}
     write_whole(path, yaml_text(bag_metadata(file.name, index.topics, index.span, about)))
 
 
@@ -119,7 +119,7 @@ class _Index:
                 channel.topic,
                 self._schemas[channel.schema_id].name,
                 channel.metadata.get('topic_type_hash', ''),
-                yaml.safe_load(channel.metadata.get('offered_qos_profiles') or '[]'),
+                parse_yaml(channel.metadata.get('offered_qos_profiles') or '[]'),
             )
             for channel in self._channels.values()
         ]

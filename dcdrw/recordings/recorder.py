@@ -16,10 +16,9 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-import yaml
-
 import dcdrw
 from dcdrw_msgs_py.quantity import Quantity
+from dcdrw_msgs_py.yaml_file import yaml_text
 
 FLUSH_SECONDS = 0.5
 """How often a recorder flushes: what a kill loses at most [s]."""
@@ -291,18 +290,6 @@ def write_whole(path: Path, text: str) -> None:
         with suppress(OSError):
             new.unlink()
         raise
-
-
-class _Dumper(getattr(yaml, 'CSafeDumper', yaml.SafeDumper)):  # type: ignore[misc]
-    """Writes every value where it stands: yaml-cpp reads no merged ones."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
-
-
-def yaml_text(content: Any) -> str:
-    """YAML as yaml-cpp reads it."""
-    return str(yaml.dump(content, Dumper=_Dumper, sort_keys=False, allow_unicode=True))
 
 
 class _WholeFile:

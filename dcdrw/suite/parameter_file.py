@@ -5,11 +5,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-import yaml
-
 from dcdrw.suite.executables import EXECUTABLES
-from dcdrw_msgs_py.quantity import build, fields, flatten
+from dcdrw_msgs_py.quantity import build, fields, flatten, suggestion
 from dcdrw_msgs_py.rig import RigParams, WheelPitch, WheelShape
+from dcdrw_msgs_py.yaml_file import read_yaml, yaml_text
 from dcdrw_sim.model.presets import PRESETS
 from dcdrw_sim.rig.simulator import SimulatorParams
 from dcdrw_tracker.gait.phase import PhaseParams
@@ -58,10 +57,7 @@ def read_parameter_file(path: Path, base: Sets) -> Sets:
         OSError: the file cannot be read.
 
     """
-    try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ValueError(f'{path} is not YAML: {" ".join(str(error).split())}') from None
+    content = read_yaml(path)
     if not isinstance(content, dict) or not all(_is_section(section) for section in content.values()):
         raise ValueError(
             f'{path} is not a parameter file: it must have the form of config/rig.yaml, '
@@ -70,12 +66,10 @@ def read_parameter_file(path: Path, base: Sets) -> Sets:
     sections = {_EVERY_NODE, *_NODES, *(f'/{node}' for node in _NODES)}
     for section in content:
         if section not in sections:
-            raise ValueError(
-                f'{path} has parameters for {section}, which no trial has; there are '
-                f'{", ".join((_EVERY_NODE, *_NODES))}'
-            )
+            known = (_EVERY_NODE, *_NODES)
+            raise ValueError(f'{path} has parameters for {section}, which no trial has{suggestion(section, known)}')
     kinds = {name: type(values) for name, values in zip(base._fields, base, strict=True)}  # type: ignore[attr-defined]
-    known = {field.name for kind in _NODES_OF for field in fields(kind)}.union(_OF_ROS)
+    all_names = {field.name for kind in _NODES_OF for field in fields(kind)}.union(_OF_ROS)
     sets: dict[str, Any] = {}
     for name, kind in kinds.items():
         mine = {field.name for field in fields(kind)}
@@ -85,7 +79,7 @@ def read_parameter_file(path: Path, base: Sets) -> Sets:
             for section in (_EVERY_NODE, *own)
             for key, value in _flatten(content.get(section, {}).get(_PARAMETERS) or {})
         }
-        chosen = {key: value for key, value in values.items() if key in mine or key not in known}
+        chosen = {key: value for key, value in values.items() if key in mine or key not in all_names}
         sets[name] = build(kind, flatten(getattr(base, name)) | chosen, str(path))
     return type(base)(**sets)
 
@@ -121,7 +115,7 @@ def write_parameter_file(params: Iterable[tuple[Any, ...]], path: Path) -> None:
     for values in params:
         for node in _NODES_OF[type(values)]:
             content.setdefault(node, {_PARAMETERS: {}})[_PARAMETERS].update(given(values))
-    path.write_text(yaml.safe_dump(content, sort_keys=False, allow_unicode=True), encoding='utf-8')
+    path.write_text(yaml_text(content), encoding='utf-8')
 
 
 def write_changed(source: Path | None, changes: Mapping[str, Any], path: Path, remark: str) -> None:
@@ -134,15 +128,13 @@ def write_changed(source: Path | None, changes: Mapping[str, Any], path: Path, r
         remark: its first line.
 
     """
-    sections = yaml.safe_load(source.read_text(encoding='utf-8')) if source else {}
+    sections = read_yaml(source) if source else {}
     content = {
         section: {name: value for name, value in _flatten(tree[_PARAMETERS] or {}) if name not in changes}
         for section, tree in sections.items()
     }
     content[_EVERY_NODE] = {**content.get(_EVERY_NODE, {}), **changes}
-    text = yaml.safe_dump(
-        {section: {_PARAMETERS: values} for section, values in content.items()}, sort_keys=False, allow_unicode=True
-    )
+    text = yaml_text({section: {_PARAMETERS: values} for section, values in content.items()})
     path.write_text(f'# {remark}\n{text}', encoding='utf-8')
 
 

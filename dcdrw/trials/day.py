@@ -7,8 +7,6 @@ from io import StringIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import yaml
-
 from dcdrw.recordings.recorder import INFORMATION, METADATA, PARAMETERS
 from dcdrw.recordings.recording import find
 from dcdrw.trials.analysis import Analysis
@@ -18,6 +16,7 @@ from dcdrw.trials.summary import Summary, final_band, summarize
 from dcdrw_msgs_py.rig import FRONT, RigParams
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.topics import JOINT_STATES
+from dcdrw_msgs_py.yaml_file import read_yaml
 
 SIMULATED, MEASURED = 'simulated', 'measured'
 
@@ -120,16 +119,15 @@ def new_name(path: Path, others: list[RecordedTrial]) -> str:
 def _source(folder: Path) -> str:
     """Whether a simulator ran; the coupler of a trial without one is what --rig says."""
     try:
-        content = yaml.safe_load((folder / PARAMETERS).read_text(encoding='utf-8'))
-    except OSError:
+        content = read_yaml(folder / PARAMETERS)
+    except (OSError, ValueError):
         return MEASURED
     return SIMULATED if isinstance(content, dict) and 'simulator' in content else MEASURED
 
 
 def _about(folder: Path) -> dict[str, str]:
     try:
-        content = yaml.safe_load((folder / METADATA).read_text(encoding='utf-8'))
-    except OSError:
+        about = read_yaml(folder / METADATA)[INFORMATION].get('custom_data') or {}
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
         return {}
-    about = content[INFORMATION].get('custom_data') or {}
     return {name: str(value) for name, value in about.items() if name != 'parameters' and value}

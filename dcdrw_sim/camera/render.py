@@ -148,7 +148,7 @@ class Renderer:
         self._rays = _pixel_rays(*camera[:2], camera.matrix.tobytes(), camera.distortion.tobytes())
         self._sight = 1.05 * float(np.hypot(*np.nan_to_num(self._rays, nan=0.0).reshape(-1, 2).T).max())
         self._tag_rays = np.nan_to_num(self._rays, nan=1e6)  # no tag there
-        pieces = 6 if camera.distortion.any() else 1  # of what is straight but in the picture
+        pieces = 1 if camera.is_straight else 6  # of what is straight but in the picture
         wheels = [_wheel_outlines(shape, self._unit, pieces) for shape in scene.wheels]
         self._wheels = [np.concatenate([points for points, _ in outlines]) for outlines in wheels]
         front, rear = (

@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from dcdrw_msgs_py.quantity import suggestion
 from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_sim.model.dynamics import State
 from dcdrw_sim.motion.ends import Strike
@@ -16,6 +17,7 @@ DEFAULT_STRIKES = 20
 
 _NUMBERS = ('g', 'slope', 'k', 'b', 'D0', 'S0')
 _PAIRS = ('l', 'm', 'alpha')
+_BESIDE = ('case', 'strikes', 'end')
 
 
 class Case(NamedTuple):
@@ -37,7 +39,8 @@ def read_cases(path: Path) -> tuple[list[Case], bool]:
     such an object under the key `case` beside its `strikes`.
 
     Raises:
-        ValueError: not JSON, not a case, or an impossible one: the message names the file, the case and the key.
+        ValueError: not JSON, not a case, an unknown key, or an impossible case: the message names the file, the case
+            and the key.
         OSError: the file cannot be read.
 
     """
@@ -55,6 +58,11 @@ def _parse(entry: Any, where: str) -> Case:
     raw = entry.get('case', entry) if isinstance(entry, dict) else None
     if not isinstance(raw, dict):
         raise ValueError(f'{where}: must be an object with the keys {", ".join((*_NUMBERS, *_PAIRS, "x0"))}')
+    known = ('name', *_NUMBERS, *_PAIRS, 'x0')
+    for keys, allowed in ((raw, known if raw is not entry else (*known, *_BESIDE)), (entry, (*known, *_BESIDE))):
+        for key in keys:
+            if key not in allowed:
+                raise ValueError(f'{where}: {key} is no key of a case{suggestion(key, allowed)}')
     name = str(raw.get('name', 'case'))
     where = f'{where} ({name})' if 'name' in raw else where
     g, slope, k, b, D0, S0 = (_numbers(raw, key, where)[0] for key in _NUMBERS)

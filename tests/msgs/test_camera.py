@@ -2,21 +2,25 @@ import math
 
 import numpy as np
 import pytest
-import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dcdrw_msgs_py.camera import Camera, make_camera, pinhole, read_camera, write_camera
+from dcdrw_msgs_py.camera import MODELS, Camera, make_camera, pinhole, read_camera, write_camera
+from dcdrw_msgs_py.yaml_file import read_yaml, yaml_text
 
 MATRIX = [900.0, 0.0, 640.0, 0.0, 905.0, 355.0, 0.0, 0.0, 1.0]
 LENSES = {
     'plumb_bob': [-0.28, 0.09, 0.001, -0.0007, -0.012],
     'rational_polynomial': [5.2, 3.1, -0.0002, 0.0004, 0.15, 5.6, 4.5, 0.9],
+    'thin_prism': [-0.2, 0.05, 0.001, -0.0007, 0.01, 0.02, 0.01, 0.003, 0.002, -0.001, 0.001, 0.0005],
+    'tilted': [-0.2, 0.05, 0.001, -0.0007, 0.01, 0.02, 0.01, 0.003, 0.002, -0.001, 0.001, 0.0005, 0.05, -0.03],
+    'equidistant': [-0.05, 0.01, -0.002, 0.0003],
 }
 
 
 def lens(model: str) -> Camera:
-    return make_camera(1280, 720, MATRIX, model, LENSES[model])
+    name = model if model in MODELS else 'rational_polynomial'
+    return make_camera(1280, 720, MATRIX, name, LENSES[model])
 
 
 @pytest.mark.parametrize('model', LENSES)
@@ -24,7 +28,9 @@ def test_pixels_are_those_of_opencv(model):
     cv2 = pytest.importorskip('cv2')
     camera = lens(model)
     points = np.random.default_rng(0).uniform((-1.0, -0.6, 1.0), (1.0, 0.6, 3.0), (200, 3))
-    expected, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), camera.matrix, camera.distortion)
+    project = cv2.fisheye.projectPoints if model == 'equidistant' else cv2.projectPoints
+    shaped = points[:, None] if model == 'equidistant' else points
+    expected, _ = project(shaped, np.zeros(3), np.zeros(3), camera.matrix, camera.distortion)
     assert camera.project(points) == pytest.approx(expected.reshape(-1, 2), abs=1e-9)
 
 
@@ -33,6 +39,24 @@ def test_rays_and_project_are_inverse_over_the_whole_picture(x, y, model):
     camera = lens(model)
     ray = camera.rays([(x, y)])
     assert camera.project(np.append(ray, 1.0)) == pytest.approx(np.array([(x, y)]), abs=1e-6)
+
+
+def test_rays_of_a_fisheye_are_those_of_opencv():
+    cv2 = pytest.importorskip('cv2')
+    camera = lens('equidistant')
+    pixels = np.random.default_rng(0).uniform((0.0, 0.0), (1280.0, 720.0), (200, 2))
+    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-14)
+    expected = cv2.fisheye.undistortPoints(pixels[:, None], camera.matrix, camera.distortion, criteria=criteria)
+    assert camera.rays(pixels) == pytest.approx(expected.reshape(-1, 2), abs=1e-9)
+    assert camera.rays([(640.0, 355.0)]) == pytest.approx(np.zeros((1, 2)))
+
+
+def test_a_fisheye_has_no_ray_beside_or_behind_it():
+    camera = make_camera(1280, 720, MATRIX, 'equidistant', [0.0] * 4)
+    edge = 640.0 + 900.0 * math.pi / 2
+    rays = camera.rays([(edge - 1.0, 355.0), (edge + 1.0, 355.0)])
+    assert rays[0, 0] > 500.0
+    assert np.isnan(rays[1]).all()
 
 
 def test_a_point_that_is_not_before_the_camera_has_no_pixel():
@@ -66,14 +90,14 @@ def test_what_is_written_is_read(model, tmp_path):
     write_camera(tmp_path / 'camera.yaml', camera)
     read = read_camera(tmp_path / 'camera.yaml')
     assert read[:2] == camera[:2]
-    assert read.model == model
+    assert read.model == camera.model
     np.testing.assert_array_equal(read.matrix, camera.matrix)
     np.testing.assert_array_equal(read.distortion, camera.distortion)
 
 
 def test_the_file_has_every_field_that_ros_drivers_read(tmp_path):
     write_camera(tmp_path / 'camera.yaml', lens('plumb_bob'), 'tripod')
-    content = yaml.safe_load((tmp_path / 'camera.yaml').read_text())
+    content = read_yaml(tmp_path / 'camera.yaml')
     assert list(content) == [
         'image_width',
         'image_height',
@@ -126,14 +150,19 @@ def content(**changes: object) -> dict[str, object]:
             {'camera_matrix': {'data': [0.0] * 9}},
             r'focal lengths .* must be > 0, got 0 and 0; calibrate the camera first',
         ),
-        ({'distortion_model': 'equidistant'}, "must be plumb_bob or rational_polynomial, got 'equidistant'"),
-        ({'distortion_coefficients': {'data': [0.1, 0.2]}}, r'plumb_bob must be 5 finite numbers, got \[0\.1, 0\.2\]'),
-        ({'distortion_coefficients': {'data': [math.nan] * 5}}, 'plumb_bob must be 5 finite numbers'),
+        ({'distortion_model': 'ftheta'}, "must be plumb_bob or rational_polynomial or equidistant, got 'ftheta'"),
+        ({'distortion_model': 3}, 'distortion_model must be a string, got 3'),
+        ({'distortion_model': 'equidistant'}, 'an equidistant .* lens has 4 coefficients'),
+        ({'distortion_coefficients': {'data': [0.1] * 3}}, 'plumb_bob must be 4, 5, 8, 12 or 14 numbers'),
+        ({'distortion_coefficients': {'data': [math.nan] * 5}}, 'must be finite numbers'),
+        ({'distorsion_model': 'equidistant'}, 'distorsion_model is no key of a camera file; did you mean distortion_m'),
+        ({'camera_matrix': {'dat': MATRIX}}, 'dat is no key of a camera file; did you mean data'),
+        ({'lens': 'wide'}, 'lens is no key of a camera file; known are image_width'),
     ],
 )
 def test_a_bad_file_is_refused_with_the_key_that_is_to_blame(changes, message, tmp_path):
     path = tmp_path / 'camera.yaml'
-    path.write_text(yaml.safe_dump(content(**changes)))
+    path.write_text(yaml_text(content(**changes)))
     with pytest.raises(ValueError, match=message) as error:
         read_camera(path)
     assert 'camera.yaml' in str(error.value)
@@ -143,6 +172,105 @@ def test_a_bad_file_is_refused_with_the_key_that_is_to_blame(changes, message, t
     ('text', 'message'), [('a: [', 'is not YAML'), ('', 'has no image_width'), ('3', 'has no image_width')]
 )
 def test_what_is_no_camera_file_is_refused(text, message, tmp_path):
+    path = tmp_path / 'camera.yaml'
+    path.write_text(text)
+    with pytest.raises(ValueError, match=message):
+        read_camera(path)
+
+
+ZEROS = [0.0] * 3
+
+
+@pytest.mark.parametrize(
+    ('model', 'coefficients', 'read', 'expected'),
+    [
+        ('plumb_bob', [*LENSES['plumb_bob'], *ZEROS], 'plumb_bob', LENSES['plumb_bob']),
+        ('radtan', LENSES['plumb_bob'][:4], 'plumb_bob', [*LENSES['plumb_bob'][:4], 0.0]),
+        ('rational_polynomial', LENSES['plumb_bob'], 'rational_polynomial', [*LENSES['plumb_bob'], *ZEROS]),
+        ('plumb_bob', LENSES['rational_polynomial'], 'rational_polynomial', LENSES['rational_polynomial']),
+        ('fisheye', LENSES['equidistant'], 'equidistant', LENSES['equidistant']),
+        ('', LENSES['plumb_bob'], 'plumb_bob', LENSES['plumb_bob']),
+        (None, LENSES['plumb_bob'], 'plumb_bob', LENSES['plumb_bob']),
+        (None, LENSES['tilted'], 'rational_polynomial', LENSES['tilted']),
+        ('none', [], 'plumb_bob', [0.0] * 5),
+    ],
+)
+def test_models_are_read_as_people_name_them(model, coefficients, read, expected, tmp_path):
+    path = tmp_path / 'camera.yaml'
+    path.write_text(yaml_text(content(distortion_model=model, distortion_coefficients={'data': coefficients})))
+    camera = read_camera(path)
+    assert (camera.model, camera.distortion.tolist()) == (read, expected)
+
+
+OPENCV = """%YAML:1.0
+---
+calibration_time: "Wed 25 Nov 2026 18:00:00"
+image_width: 1280
+image_height: 720
+flags: 0
+FISHEYEcamera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 9.0000000000000000e+02, 0., 640., 0., 905., 355., 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 4
+   cols: 1
+   dt: d
+   data: [ -0.05, 1.0e-02, -2e-03, 3e-04 ]
+avg_reprojection_error: 2.1e-01
+"""
+KALIBR = """cam0:
+  cam_overlaps: []
+  camera_model: pinhole
+  distortion_coeffs: [-0.05, 0.01, -0.002, 0.0003]
+  distortion_model: equidistant
+  intrinsics: [900.0, 905.0, 640.0, 355.0]
+  resolution: [1280, 720]
+  rostopic: /cam0/image_raw
+"""
+VOXL = """%YAML:1.0
+---
+M: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 900., 0., 640., 0., 905., 355., 0., 0., 1. ]
+D: !!opencv-matrix
+   rows: 4
+   cols: 1
+   dt: d
+   data: [ -0.05, 0.01, -0.002, 0.0003 ]
+reprojection_error: 0.2
+width: 1280
+height: 720
+distortion_model: "fisheye"
+calibration_time: "2026-11-25"
+"""
+
+
+@pytest.mark.parametrize(
+    'text', [OPENCV.replace('FISHEYE', 'fisheye_model: 1\n'), KALIBR, VOXL], ids=['OpenCV', 'kalibr', 'voxl']
+)
+def test_files_of_other_calibrations_are_read(text, tmp_path):
+    path = tmp_path / 'camera.yaml'
+    path.write_text(text)
+    camera = read_camera(path)
+    assert camera[:2] == (1280, 720)
+    assert camera.matrix.ravel().tolist() == MATRIX
+    assert (camera.model, camera.distortion.tolist()) == ('equidistant', LENSES['equidistant'])
+
+
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        (KALIBR + KALIBR.replace('cam0', 'cam1'), 'has several cameras, cam0, cam1: keep the one'),
+        (KALIBR.replace('pinhole', 'omni'), "camera_model must be pinhole, got 'omni'"),
+        (KALIBR.replace('resolution', 'resolutoin'), 'resolutoin is no key of a camera file; did you mean resolution'),
+        (KALIBR.replace('  resolution: [1280, 720]\n', ''), 'has no resolution'),
+    ],
+)
+def test_a_bad_file_by_kalibr_is_told(text, message, tmp_path):
     path = tmp_path / 'camera.yaml'
     path.write_text(text)
     with pytest.raises(ValueError, match=message):

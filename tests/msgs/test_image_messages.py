@@ -51,6 +51,57 @@ def test_every_encoding_is_read_whatever_the_step(more):
         assert (frame(message('mono16', deep, 10 + more, bigendian)).image == GREY).all()
 
 
+@pytest.mark.parametrize('bits', [10, 12, 14, 16])
+@pytest.mark.parametrize('bigendian', [False, True])
+def test_the_upper_bits_of_a_deep_picture_are_read(bits, bigendian):
+    grey = GREY.copy()
+    grey[0, 0] = 255
+    deep = (grey.astype(np.uint16) << (bits - 8) | 1).astype('>u2' if bigendian else '<u2').view(np.uint8)
+    assert (frame(message('mono16', deep, bigendian=bigendian)).image == grey).all()
+    assert (frame(message('16UC1', deep, bigendian=bigendian)).image == grey).all()
+
+
+@pytest.mark.parametrize('alpha', [0, 255])
+def test_colours_are_read_in_every_order(alpha):
+    pytest.importorskip('cv2')
+    with_alpha = np.dstack((COLOUR, np.full((7, 5), alpha, np.uint8)))
+    assert (frame(message('bgra8', with_alpha)).image == COLOUR).all()
+    assert (frame(message('8UC4', with_alpha)).image == COLOUR).all()
+    assert (frame(message('rgba8', with_alpha[..., (2, 1, 0, 3)])).image == COLOUR).all()
+    bright = COLOUR.copy()
+    bright[0, 0, 0] = 255
+    deep = (bright.astype('<u2') << 8).view(np.uint8)
+    assert (frame(message('bgr16', deep)).image == bright).all()
+
+
+def test_the_brightness_of_yuv_is_read():
+    packed = np.dstack((GREY, np.full_like(GREY, 128)))
+    for encoding in ('yuv422_yuy2', 'yuyv'):
+        assert (frame(message(encoding, packed)).image == GREY).all()
+    for encoding in ('yuv422', 'uyvy', 'UYVY'):
+        assert (frame(message(encoding, packed[..., ::-1])).image == GREY).all()
+    for encoding in ('nv12', 'nv21', 'nv24'):
+        planes = message(encoding, np.vstack((GREY, RANDOM.integers(0, 256, (4, 5), np.uint8))))
+        planes.height = 7
+        assert (frame(planes).image == GREY).all()
+
+
+@pytest.mark.parametrize(
+    ('pattern', 'red', 'blue'),
+    [('rggb', (0, 0), (1, 1)), ('bggr', (1, 1), (0, 0)), ('gbrg', (1, 0), (0, 1)), ('grbg', (0, 1), (1, 0))],
+)
+def test_colours_behind_a_bayer_filter_are_told_apart(pattern, red, blue):
+    """The reference is cv_bridge's own table of patterns; here: a red picture and a blue one."""
+    pytest.importorskip('cv2')
+    for (row, column), channel in ((red, 2), (blue, 0)):
+        mosaic = np.zeros((8, 8), np.uint8)
+        mosaic[row::2, column::2] = 200
+        image = frame(message(f'bayer_{pattern}8', mosaic, width=8)).image
+        assert image[2:6, 2:6, channel].min() == 200
+        assert image[2:6, 2:6, 1].max() == 0
+        assert image[2:6, 2:6, 2 - channel].max() == 0
+
+
 @settings(max_examples=30, deadline=None)
 @given(st.integers(1, 40), st.integers(1, 40), st.booleans(), st.integers(0, 2**31 * 10**9 - 1))
 def test_frames_survive(height, width, colour, stamp):
@@ -71,7 +122,7 @@ def test_compressed_frames_are_read():
 @pytest.mark.parametrize(
     ('bad', 'error'),
     [
-        (message('yuv422', COLOUR), "the encoding 'yuv422' is not read; let the camera send mono8"),
+        (message('yuv411', COLOUR), "the encoding 'yuv411' is not read; let the camera send mono8"),
         (message('bgr8', GREY), '35 bytes in rows of 5 are no bgr8 picture of 5x7'),
         (Image(encoding='mono8', width=5, step=5), '0 bytes in rows of 5 are no mono8 picture of 5x0'),
     ],

@@ -117,3 +117,16 @@ def test_a_directory_and_a_missing_file_are_named(tmp_path):
 def test_square_wheels_are_allowed(tmp_path):
     (case,), _ = read(tmp_path, CASE | {'alpha': [math.pi / 4, math.pi / 4]})
     assert case.rig.front.spokes == 4.0
+
+
+@pytest.mark.parametrize(
+    ('content', 'message'),
+    [
+        (CASE | {'sloep': 0.03}, r'sloep is no key of a case; did you mean slope\?'),
+        ({'case': CASE | {'bb': 1.0}}, 'bb is no key of a case'),
+        ({'case': CASE, 'strike': []}, r'strike is no key of a case; did you mean strikes\?'),
+    ],
+)
+def test_unknown_keys_are_refused_with_a_suggestion(tmp_path, content, message):
+    with pytest.raises(ValueError, match=message):
+        read(tmp_path, content)

@@ -329,9 +329,9 @@ def stepped(samples: list[JointSample], at: int, ns: int) -> list[JointSample]:
     return samples[:at] + shift(samples[at:], ns)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(
-    st.integers(1_600, 2_000),
+    st.integers(1_800, 2_100),
     st.sampled_from([37 * SECOND, -37 * SECOND, 3 * SECOND, -(10**18), 10**18]),
     st.floats(0.0, 0.3),
     st.booleans(),
@@ -370,7 +370,7 @@ def test_wheels_that_stop_in_a_gap_are_no_clock_that_was_set() -> None:
 
 def test_a_lone_stamp_from_the_future_is_refused_and_changes_nothing() -> None:
     samples = walk(10.0).samples()
-    samples[1500] = samples[1500]._replace(stamp_ns=samples[1500].stamp_ns + 37 * SECOND)
+    samples[1900] = samples[1900]._replace(stamp_ns=samples[1900].stamp_ns + 37 * SECOND)
     status = run(samples)[2]
     assert status.refusals == {'future': 1}
     assert (status.clock_steps, status.restarts, status.accepted) == ((), 0, len(samples) - 1)
