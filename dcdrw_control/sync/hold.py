@@ -49,28 +49,23 @@ class HoldLaw:
         """Forget what was."""
         self._last, self.force = None, math.nan
 
-    def update(self, sample: PhaseSample, acting: float) -> float:
-        """Take the next sample and return the wanted force [N].
-
-        Args:
-            sample: with rates.
-            acting: the force that acted in the step before, which limits may have cut [N].
-
-        """
+    def update(self, sample: PhaseSample) -> float:
+        """Take the next sample, with rates, and return the wanted force [N]."""
         last, self._last = self._last, sample
         if last and sample.front.angle < last.front.angle - self._alpha1:  # it stands on the next spoke
-            self.force = self._answer(last, acting)
+            self.force = self._answer(last)
         return self.force
 
-    def _answer(self, last: PhaseSample, acting: float) -> float:
+    def _answer(self, last: PhaseSample) -> float:
         """The force that answers the strike after a sample."""
         omega1, omega2 = last.front.rate, last.rear.rate
         until = (self._alpha1 - last.front.angle) / omega1 if omega1 > 0.0 else 0.0
         aim1, aim2, aim_rate2 = self._gains.state
         theta2 = math.remainder(last.rear.angle + omega2 * until - aim2, 2.0 * self._alpha2)
         gain1, gain2, gain3 = self._gains.gain
+        before = self.force - self._gains.force if math.isfinite(self.force) else 0.0
         return (
             self._gains.force
             - (gain1 * (omega1 - aim1) + gain2 * theta2 + gain3 * (omega2 - aim_rate2))
-            - self._gains.gain_before * (acting - self._gains.force)
+            - self._gains.gain_before * before
         )

@@ -20,6 +20,10 @@ class SynchronizerParams(NamedTuple):
 
     law: Annotated[str, Quantity(f'what computes the force: {", ".join(LAWS)}')] = 'off'
     hold: HoldGains = HoldGains()
+    damping: Annotated[
+        float,
+        Quantity('damping that the force adds to the coupler, where its own would stall the pair', 'N·s/m', low=0.0),
+    ] = 0.0
     front: WheelShape = WheelShape()
     rear: WheelShape = WheelShape()
     S0: StanceDistance = math.nan
@@ -120,7 +124,7 @@ class Synchronizer:
             before = (last.front, last.rear)[i] if last else turn
             if abs(turn.angle - before.angle) > wheel.alpha or not math.isfinite(self._struck[i]):
                 self._struck[i] = now
-        self._law.update(sample, self.safety.force)
+        self._law.update(sample)
         self._last, self._heard = sample, now
 
     def command(self, now: float) -> Command:
@@ -139,7 +143,8 @@ class Synchronizer:
         )
         state = self.safety.update(now, now - self._heartbeat <= self.params.enable_timeout, ready)
         rate = self._coupler_rate()
-        force = self.safety.command(now, self._law.force, rate)
+        damping = self.params.damping * rate if self.params.damping else 0.0
+        force = self.safety.command(now, self._law.force + damping, rate)
         if math.isfinite(self._asked) and math.isfinite(rate):
             self.work += abs(force * rate) * (now - self._asked)
         self._asked = now
@@ -160,7 +165,7 @@ class Synchronizer:
         (theta1, omega1), (theta2, omega2) = self._last.front, self._last.rear
         front, rear = self.params.front, self.params.rear
         S0 = front.length if math.isnan(self.params.S0) else self.params.S0
-        S = S0 + self._last.step_difference * front.step_length
+        S = S0 + (front.step_length if theta1 < theta2 else 0.0)  # the front wheel has struck since the rear one
         x = front.length * math.sin(theta1) - rear.length * math.sin(theta2) + S
         y = front.length * math.cos(theta1) - rear.length * math.cos(theta2)
         x_rate = front.length * math.cos(theta1) * omega1 - rear.length * math.cos(theta2) * omega2

@@ -11,6 +11,7 @@ from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.samples import JointSample, PhaseSample, Turn
 from dcdrw_sim.map.holding import law, plant
 from dcdrw_sim.model.presets import preset
+from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.model.start import start
 from dcdrw_sim.motion.pair import Simulation
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams
@@ -134,3 +135,17 @@ def test_hold_without_gains_is_refused_with_the_mend():
         SynchronizerParams(law='hold').check_law()
     with pytest.raises(ValueError, match='law must be one of'):
         SynchronizerParams(law='grip').check_law()
+
+
+def test_with_added_damping_a_pair_that_would_stall_walks_in_step():
+    """b̂ = 1 on 1.75°: the coupler alone stalls the pair; more damping leads out of that band, and takes no power."""
+    unit = nondimensional(PAPER)[1].damping
+    rig = PAPER._replace(k=0.005 * nondimensional(PAPER)[1].stiffness, b=unit, slope=math.radians(1.75)).resolved()
+    added = unit
+    params = params_for(rig._replace(b=rig.b + added))._replace(damping=added)
+    rows = list(walk(rig, params, 0.2, 15.0))
+    assert steps(rows) <= 4
+    assert max(abs(force) for _, _, force, _, _ in rows) <= params.limits.max_force
+    assert sum(force * rate for _, _, force, rate, _ in rows[-round(5.0 * RATE) :]) > 0.0  # it brakes
+    alone = list(walk(rig, params_for(PAPER, 'off'), 0.2, 15.0))
+    assert alone[-1][0] == alone[-round(2.0 * RATE)][0]  # a wheel hangs
