@@ -13,7 +13,9 @@ from dcdrw_sim.map.holding import law, plant
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.model.start import start
+from dcdrw_sim.motion.ends import End
 from dcdrw_sim.motion.pair import Simulation
+from dcdrw_sim.motion.trajectory import run
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams
 
 PAPER = preset('paper')
@@ -147,5 +149,8 @@ def test_with_added_damping_a_pair_that_would_stall_walks_in_step():
     assert steps(rows) <= 4
     assert max(abs(force) for _, _, force, _, _ in rows) <= params.limits.max_force
     assert sum(force * rate for _, _, force, rate, _ in rows[-round(5.0 * RATE) :]) > 0.0  # it brakes
-    alone = list(walk(rig, params_for(PAPER, 'off'), 0.2, 15.0))
-    assert alone[-1][0] == alone[-round(2.0 * RATE)][0]  # a wheel hangs
+    assert run(*start(rig, 0.2), seconds=120.0).end in (
+        End.STANDING,
+        End.STALLED,
+        End.FALLEN,
+    )  # alone it does not walk on
