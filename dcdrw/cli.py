@@ -18,6 +18,7 @@ COMMANDS = {
     'live': Command('live', 'watch a running suite in the browser'),
     'record': Command('record', 'record a running suite'),
     'replay': Command('replay', 'publish recorded joint states again'),
+    'mend': Command('mend', 'a damaged recording into a new one'),
     'analyze': Command('analyze', 'judge recorded trials'),
     'legs': Command('legs', "follow people's legs by their sensors"),
     'report': Command('report', 'recorded trials on one page'),
@@ -43,6 +44,7 @@ examples:
   dcdrw live --trial                      watch a simulated trial in the browser
   dcdrw record --note 'new springs'       record the nodes that run on this machine or network
   dcdrw analyze trials/first trials/second
+  dcdrw mend trials/killed --out mended   what can be read of a damaged recording, for other tools
   dcdrw legs walk.csv --rate 204.8        people's heel strikes and phase, from sensors on their legs
   dcdrw report trials/* --out today.html  a day of trials on one page
   dcdrw design --slope-deg 2.5            which spring and dashpot to buy

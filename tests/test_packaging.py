@@ -32,12 +32,14 @@ OPTIONAL = {
     'distributed',
     'netCDF4',
     'llvmlite',
+    'lz4',
     'mcap',
     'numba',
     'pupil_apriltags',
     'rosbags',
     'tqdm',
     'xarray',
+    'zstandard',
 }
 
 

@@ -1,6 +1,7 @@
 """`dcdrw analyze`: recordings in, the same results as a live trial's out, and whether the nodes agreed."""
 
 import argparse
+import sys
 from pathlib import Path
 
 from dcdrw.trials.results import describe, read_trial, write_results
@@ -8,9 +9,11 @@ from dcdrw.trials.summary import sentence
 from dcdrw_msgs_py.topics import JOINT_STATES
 
 _EPILOG = """\
-A recording is the folder of one, or that of a trial, or an .mcap or .db3 file, by this suite or by ros2 bag record.
+A recording is the folder of one, or that of a trial, or a file of one (.mcap or .db3, compressed or not), by this suite
+or by ros2 bag record.
 The parameters are those that were recorded, or the defaults, and what --rig changes. Without --out, nothing is
-written. Exit status: 0 all were analyzed, 2 one could not be.
+written. Exit status: 0 all were analyzed, 1 one of several could not be or is damaged in parts, which are left out,
+2 wrong input.
 """
 
 
@@ -51,9 +54,20 @@ def run(options: argparse.Namespace) -> int:
             raise ValueError(f'{folder} exists already, not overwriting; choose another --out')
         if folders.count(folder) > 1:
             raise ValueError(f'several recordings are called {folder.name}: analyze them one by one')
+    several, status = len(options.recordings) > 1, 0
     for path, folder in zip(options.recordings, folders, strict=True):
-        trial, agreements = read_trial(path, rig=options.rig, topic=options.topic)
-        prefix = f'{path}: ' if len(options.recordings) > 1 else ''
+        try:
+            trial, agreements = read_trial(path, rig=options.rig, topic=options.topic)
+        except (ValueError, OSError) as error:
+            if not several:
+                raise
+            print(f'dcdrw analyze: {error}', file=sys.stderr)  # the others are worth their verdict
+            status = 1
+            continue
+        for text in (*trial.damage, *trial.notes):
+            print(f'dcdrw analyze: {text}', file=sys.stderr)
+        status = 1 if trial.damage else status
+        prefix = f'{path}: ' if several else ''
         print(prefix + sentence(trial))
         for topic, (recorded, equal) in agreements.items():
             print(f'{prefix}{topic}: {equal} of {recorded} recorded are the same here to the last bit')
@@ -61,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
             folder.mkdir(parents=True, exist_ok=True)
             write_results(trial, folder, recording=str(path), agreement=describe(agreements))
             print(f'{prefix}written: {folder}/')
-    return 0
+    return status
 
 
 def _name(path: Path) -> str:

@@ -11,7 +11,8 @@ from dcdrw.trials.results import SAMPLES_HEADER
 from dcdrw_msgs_py.topics import JOINT_STATES
 
 _EPILOG = """\
-A recording is the folder of one, or that of a trial, or an .mcap or .db3 file, by this suite or by ros2 bag record.
+A recording is the folder of one, or that of a trial, or a file of one (.mcap or .db3, compressed or not), by this suite
+or by ros2 bag record.
 The page holds its pictures itself and needs no network. Beside it, in the folder REPORT.csv: trials.csv (a row for
 each trial), steps.csv (a row for each footfall) and samples.csv (all).
 
@@ -52,6 +53,8 @@ def run(options: argparse.Namespace) -> int:
         try:
             trials.append(open_trial(path, new_name(path, trials), options.rig, options.topic))
             print(f'{trials[-1].name}: {trials[-1].summary.sentence}')
+            for text in (*trials[-1].analysis.damage, *trials[-1].analysis.notes):
+                print(f'dcdrw report: {text}', file=sys.stderr)
         except (ValueError, OSError) as error:  # the other trials of the day are worth their page
             print(f'dcdrw report: left out: {error}', file=sys.stderr)
     if not trials:
@@ -73,4 +76,5 @@ def run(options: argparse.Namespace) -> int:
             writer.writerows((trial.name, *row) for row in zip(*columns, strict=True))
     options.out.write_text(text, encoding='utf-8')
     print(f'Written: {options.out} and {tables}/')
-    return 0 if len(trials) == len(options.recordings) else 1
+    whole = len(trials) == len(options.recordings) and not any(trial.analysis.damage for trial in trials)
+    return 0 if whole else 1

@@ -18,9 +18,9 @@ from dcdrw.arguments import number, positive
 from dcdrw.commands.film import Files, open_video
 from dcdrw.commands.trial import free_folder
 from dcdrw.progress import Progress, interruptible
+from dcdrw.recordings.bag_folder import RECORDING
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.joint_recording import record_joints
-from dcdrw.recordings.recording import RECORDING
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw.trials.analysis import Analysis, analyze
 from dcdrw.trials.results import write_results

@@ -11,7 +11,8 @@ from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
-from dcdrw.recordings.recording import Message, Recording
+from dcdrw.recordings.bag_file import Message
+from dcdrw.recordings.recording import Recording
 from dcdrw_msgs_py.messages import to_stamp
 from dcdrw_msgs_py.node import advertise, steady_clock
 from dcdrw_msgs_py.samples import SECOND

@@ -4,12 +4,12 @@ MCAP is written by the official library: its chunks can be closed and flushed at
 to a megabyte for itself. Whole chunks are all that a killed recorder leaves, and all that a reader needs.
 """
 
-import fcntl
 import os
 import platform
 import subprocess
 import time
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from datetime import datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -17,15 +17,17 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import dcdrw
+from dcdrw.recordings.bag_file import RecordedTopic
 from dcdrw_msgs_py.quantity import Quantity
-from dcdrw_msgs_py.yaml_file import yaml_text
+from dcdrw_msgs_py.yaml_file import parse_yaml, yaml_text
 
 FLUSH_SECONDS = 0.5
-"""How often a recorder flushes: what a kill loses at most [s]."""
+"""How often a recorder flushes: what a kill loses at most, and with as much again a loss of power [s]."""
 METADATA = 'metadata.yaml'
 PARAMETERS = 'parameters.yaml'
 
 INFORMATION = 'rosbag2_bagfile_information'
+_LONGEST_QOS = 2**16
 _VERSION = 9  # of rosbag2's metadata, as Jazzy writes it
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 
@@ -61,27 +63,6 @@ class RecorderParams(NamedTuple):
         ),
     ] = ''
     record: Annotated[bool, Quantity('begin at once: else when ~/record says so')] = False
-
-
-class RecordedTopic(NamedTuple):
-    """A topic as rosbag2's metadata describe it."""
-
-    name: str
-    type: str
-    hash: str
-    """Of the type (RIHS01)."""
-    qos: list[dict[str, Any]]
-    """What its publishers offer."""
-
-
-class Span(NamedTuple):
-    """What a recording holds."""
-
-    counts: dict[str, int]
-    """Messages by topic."""
-    start_ns: int
-    end_ns: int
-    """When the first and the last message came."""
 
 
 def offered_qos(reliable: bool, latched: bool, depth: int = 0) -> dict[str, Any]:
@@ -132,7 +113,8 @@ class Recorder:
     """Writes one recording.
 
     `about` is kept with it (rosbag2's custom_data) and may change while it runs. What is written up to a `flush`
-    survives a kill. A disk that is full, or any other OSError, ends the recording; what was flushed stays.
+    survives a kill, and a loss of power as soon as the disk has it, which a thread sees to. A disk that is full, or any
+    other OSError, ends the recording; what was flushed stays.
 
     Raises:
         ValueError: the folder exists, or a library is missing.
@@ -156,12 +138,19 @@ class Recorder:
         self._types = get_typestore(Stores.ROS2_JAZZY)
         self._topics: dict[str, RecordedTopic] = {}
         self._channels: dict[str, int] = {}
+        """Of the topics that have a message: what nobody speaks of is no topic of the recording."""
         self._schemas: dict[str, int] = {}
+        self._described = b''
+        """New topics, for the file to name them outside of the chunk that does: a damaged chunk costs none its name."""
         self._file = _WholeFile(folder / f'{folder.resolve().name}_0.mcap')
         self._writer: Any = Writer(self._file, compression=CompressionType.ZSTD)  # type: ignore[arg-type]
         # Wall time at the start, and from there on a clock that never jumps: the log stays in order.
         self._zero_ns = time.time_ns() - time.monotonic_ns()
         self._start_ns = self._end_ns = 0
+        self._told: tuple[Any, ...] = ()
+        """What the metadata on the disk rest on."""
+        self._disk = ThreadPoolExecutor(1, 'disk')
+        self._syncing: Future[None] | None = None
         self._writer.start('ros2', f'dcdrw {self.about["dcdrw_version"]}')
         self._note_metadata()
         self.flush()
@@ -180,126 +169,176 @@ class Recorder:
         """
         if kind not in self._types.types:
             raise ValueError(f'{name} is not recorded: the definition of {kind} is not known')
-        if kind not in self._schemas:
-            definition, _ = self._types.generate_msgdef(kind, ros_version=2)
-            self._schemas[kind] = self._writer.register_schema(kind, 'ros2msg', definition.encode())
-        topic = RecordedTopic(name, kind, self._types.hash_rihs01(kind), list(qos))
-        self._topics[name] = topic
-        self._channels[name] = self._writer.register_channel(
-            name,
-            'cdr',
-            self._schemas[kind],
-            {'offered_qos_profiles': yaml_text(topic.qos).strip(), 'topic_type_hash': topic.hash},
+        definition, _ = self._types.generate_msgdef(kind, ros_version=2)
+        self.add(
+            RecordedTopic(
+                name, kind, self._types.hash_rihs01(kind), yaml_text(list(qos)).strip(), definition, 'ros2msg'
+            )
         )
-        self.counts[name] = 0
+
+    def add(self, topic: RecordedTopic) -> None:
+        """Add a topic that is described already."""
+        self._topics[topic.name] = topic
+        self.counts[topic.name] = 0
 
     def write(self, topic: str, data: bytes, log_ns: int | None = None) -> None:
         """Take a serialized message (CDR) that has come at a time, by default now."""
         now = self._zero_ns + time.monotonic_ns() if log_ns is None else log_ns
-        self._writer.add_message(self._channels[topic], now, data, now)
+        channel = self._channels.get(topic)
+        if channel is None:
+            channel = self._channels[topic] = self._register(self._topics[topic])
+        self._writer.add_message(channel, now, data, now)
         self.counts[topic] += 1
-        self._start_ns, self._end_ns = self._start_ns or now, now
+        self._start_ns, self._end_ns = min(self._start_ns or now, now), max(self._end_ns, now)
 
     def flush(self) -> None:
-        """Bring to the disk what there is, and the metadata to its state.
+        """Hand to the operating system what there is, and begin to bring it to the disk.
 
         Raises:
-            OSError: the disk is full, say.
+            OSError: the disk is full, say, or was when the last flush was brought there.
 
         """
         self._writer.flush()
-        self._write_metadata()
+        if self._described:
+            self._file.write(self._described)
+            self._file.flush()
+            self._described = b''
+        if self._syncing and self._syncing.done():
+            self._syncing.result()
+            self._syncing = None
+        if self._syncing is None:
+            told = (tuple(self._channels), tuple(self.about.items()))
+            metadata = '' if told == self._told else yaml_text(self._metadata())
+            self._told = told
+            self._syncing = self._disk.submit(self._sync, metadata)
 
     def close(self) -> None:
         """End the recording with its index.
 
         Raises:
-            OSError: as `flush`; what was flushed before stays, and is indexed when it is opened.
+            OSError: as `flush`; what was flushed before stays.
 
         """
         try:
             self._note_metadata()
             self._writer.finish()
             self._file.flush()
-            self._write_metadata()
+            if self._syncing:
+                self._syncing.result()
+            self._sync(yaml_text(self._metadata()))
         finally:
-            self._file.close()
+            self.abort()
 
     def abort(self) -> None:
         """End the recording without its index, after an OSError."""
+        self._disk.shutdown()
         self._file.close()
 
+    def _register(self, topic: RecordedTopic) -> int:
+        """Describe a topic in the file, when its first message comes."""
+        from mcap.data_stream import RecordBuilder
+        from mcap.records import Channel, Schema
+
+        definition = topic.definition.encode()
+        if topic.type not in self._schemas:
+            self._schemas[topic.type] = self._writer.register_schema(topic.type, topic.definition_format, definition)
+        schema = Schema(self._schemas[topic.type], definition, topic.definition_format, topic.type)
+        about = {'offered_qos_profiles': topic.qos, 'topic_type_hash': topic.hash}
+        key = int(self._writer.register_channel(topic.name, topic.serialization, schema.id, about))
+        builder = RecordBuilder()
+        schema.write(builder)
+        Channel(key, topic.name, topic.serialization, about, schema.id).write(builder)
+        self._described += builder.end()  # type: ignore[no-untyped-call]
+        return key
+
     def _metadata(self) -> dict[str, Any]:
-        return bag_metadata(
-            self._file.path.name,
-            list(self._topics.values()),
-            Span(self.counts, self._start_ns, self._end_ns),
-            self.about,
-        )
+        """The content of metadata.yaml: rosbag2's rosbag2_storage/yaml.hpp."""
+        extent = {
+            'duration': {'nanoseconds': self._end_ns - self._start_ns},
+            'starting_time': {'nanoseconds_since_epoch': self._start_ns},
+            'message_count': sum(self.counts.values()),
+        }
+        file = self._file.path.name
+        return {
+            INFORMATION: {
+                'version': _VERSION,
+                'storage_identifier': 'mcap',
+                **extent,
+                'topics_with_message_count': [
+                    {
+                        'topic_metadata': {
+                            'name': topic.name,
+                            'type': topic.type,
+                            'serialization_format': topic.serialization,
+                            'offered_qos_profiles': _profiles(topic.qos),
+                            'type_description_hash': topic.hash,
+                        },
+                        'message_count': self.counts[topic.name],
+                    }
+                    for topic in map(self._topics.__getitem__, self._channels)
+                ],
+                'compression_format': '',
+                'compression_mode': '',  # chunks are compressed by MCAP itself
+                'relative_file_paths': [file],
+                'files': [{'path': file, **extent}],
+                'custom_data': dict(self.about),
+                'ros_distro': os.environ.get('ROS_DISTRO', 'jazzy'),
+            }
+        }
 
     def _note_metadata(self) -> None:
         """The metadata within the file, as rosbag2 does it."""
         self._writer.add_metadata('rosbag2', {'serialized_metadata': yaml_text(self._metadata()[INFORMATION])})
 
-    def _write_metadata(self) -> None:
-        write_whole(self.folder / METADATA, yaml_text(self._metadata()))
+    def _sync(self, metadata: str) -> None:
+        """Bring to the disk what was flushed, and new metadata where there are any."""
+        self._file.sync()
+        if metadata:
+            write_whole(self.folder / METADATA, metadata)
 
 
-def bag_metadata(file: str, topics: Sequence[RecordedTopic], span: Span, about: Mapping[str, str]) -> dict[str, Any]:
-    """The content of metadata.yaml: rosbag2's rosbag2_storage/yaml.hpp."""
-    extent = {
-        'duration': {'nanoseconds': span.end_ns - span.start_ns},
-        'starting_time': {'nanoseconds_since_epoch': span.start_ns},
-        'message_count': sum(span.counts.values()),
-    }
-    return {
-        INFORMATION: {
-            'version': _VERSION,
-            'storage_identifier': 'mcap',
-            **extent,
-            'topics_with_message_count': [
-                {
-                    'topic_metadata': {
-                        'name': topic.name,
-                        'type': topic.type,
-                        'serialization_format': 'cdr',
-                        'offered_qos_profiles': topic.qos,
-                        'type_description_hash': topic.hash,
-                    },
-                    'message_count': span.counts.get(topic.name, 0),
-                }
-                for topic in topics
-            ],
-            'compression_format': '',
-            'compression_mode': '',  # chunks are compressed by MCAP itself
-            'relative_file_paths': [file],
-            'files': [{'path': file, **extent}],
-            'custom_data': dict(about),
-            'ros_distro': os.environ.get('ROS_DISTRO', 'jazzy'),
-        }
-    }
+def _profiles(qos: str) -> list[Any]:
+    """QoS profiles from their text, which may come from a damaged recording."""
+    try:
+        profiles = parse_yaml(qos[:_LONGEST_QOS])
+    except ValueError:
+        return []
+    return profiles if isinstance(profiles, list) else []
 
 
 def write_whole(path: Path, text: str) -> None:
     """Write a file so that whoever reads it, and whenever a kill comes, finds the old content or the new."""
     new = path.with_suffix(f'{path.suffix}.new')
     try:
-        new.write_text(text, encoding='utf-8')
+        with new.open('w', encoding='utf-8') as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
         new.replace(path)
+        _sync_folder(path.parent)
     except OSError:
         with suppress(OSError):
             new.unlink()
         raise
 
 
+def _sync_folder(folder: Path) -> None:
+    """Bring to the disk which files a folder has."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
 class _WholeFile:
-    """A new file that grows by what was written between two flushes, or not at all. Locked while it grows."""
+    """A new file that grows by what was written between two flushes, or not at all."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.size = 0
         self._file = path.open('xb', buffering=0)
-        fcntl.flock(self._file, fcntl.LOCK_EX)
+        _sync_folder(path.parent)
         self._pending = bytearray()
 
     def write(self, data: bytes) -> int:
@@ -319,6 +358,10 @@ class _WholeFile:
             raise
         self.size += len(self._pending)
         self._pending.clear()
+
+    def sync(self) -> None:
+        """Bring to the disk what was flushed."""
+        os.fsync(self._file.fileno())
 
     def close(self) -> None:
         self._file.close()

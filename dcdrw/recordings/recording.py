@@ -1,74 +1,95 @@
-"""Recordings: opened whoever made them, mended where their recorder was killed, read as messages and as joints."""
+"""Recordings: opened whoever made them, read as messages and as joints, and never written to."""
 
+import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, ExitStack
 from itertools import groupby, islice
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple
 
+from dcdrw.recordings.bag_file import CDR, BagFile, Message, RecordedTopic
+from dcdrw.recordings.bag_folder import COMPRESSIONS, find_bag
 from dcdrw.recordings.joint_batch import JointBatch, decode_joints
-from dcdrw.recordings.recorder import METADATA, PARAMETERS, require_libraries
+from dcdrw.recordings.recorder import PARAMETERS, require_libraries
 
 BATCH = 4096
 """Messages that are decoded at once."""
-RECORDING = 'recording'
-"""The folder of the recording within that of a trial."""
 JOINT_STATE = 'sensor_msgs/msg/JointState'
-
-
-class Message(NamedTuple):
-    """One recorded message."""
-
-    topic: str
-    log_ns: int
-    """When the recorder got it."""
-    data: bytes
-    """As it came off the wire (CDR)."""
+_FIRST, _LAST = -(2**63), 2**64
 
 
 class Recording(AbstractContextManager['Recording']):
     """An open recording: one by `dcdrw record`, `dcdrw trial` or `ros2 bag record`, in MCAP or sqlite3.
 
-    One that was not closed is mended where it is: whole chunks are kept, and get the index that is missing.
+    No file of it is written to or locked, and none is made beside it. What is damaged is left out, and told in
+    `damage`; the recording may be one that somebody is still writing.
 
     Args:
-        path: the recording's folder, that of a trial, or an .mcap or .db3 file.
+        path: the recording's folder, that of a trial, or a file of it, compressed or not.
 
     Raises:
-        ValueError: no recording, or one that cannot be read; or rosbags is missing.
-        OSError: it cannot be read or mended.
+        ValueError: no recording, or none of its files can be read; or a library is missing.
+        OSError: its folder cannot be read.
 
     """
 
     def __init__(self, path: Path) -> None:
         require_libraries()
-        from rosbags.rosbag2 import Reader
-
-        from dcdrw.recordings.mending import is_closed, mend
-
-        self.path = find(path)
-        for file in [self.path] if self.path.is_file() else sorted(self.path.glob('*.mcap')):
-            if not is_closed(file):
-                mend(file)
+        bag = find_bag(path)
+        self.path = bag.path
+        """Its folder, or its lone file."""
+        self.about = bag.about
+        """What was kept with it (rosbag2's custom_data)."""
+        self._notes = list(bag.notes)
+        self._lost: list[str] = []
+        self._files: list[BagFile] = []
+        self._stack = ExitStack()
         try:
-            self._reader: Any = Reader(self.path)
-            self._reader.open()
-        except PermissionError:
+            for file in bag.files:
+                self._open(file)
+            if not self._files:
+                raise ValueError('; '.join(self._lost))
+        except BaseException:
+            self._stack.close()
             raise
-        except Exception as error:  # of any kind, for the content may be anything
-            raise ValueError(f'{path} cannot be read: {str(error) or type(error).__name__}') from None
-        self.types: dict[str, str] = {c.topic: c.msgtype for c in self._reader.connections}
-        """The topics, and their types."""
-        self.start_ns: int = self._reader.start_time
-        self.end_ns: int = self._reader.end_time
+        self._files.sort(key=lambda file: file.start_ns)
+        self.topics: dict[str, RecordedTopic] = {}
+        for one in self._files:
+            for name, topic in one.topics.items():
+                self.topics.setdefault(name, topic)
+        self.types: dict[str, str] = {
+            topic.name: topic.type for topic in self.topics.values() if topic.serialization == CDR
+        }
+        """The topics that ROS 2 reads, and their types."""
+        filled = [one for one in self._files if any(one.counts.values())]
+        self.start_ns: int = min((one.start_ns for one in filled), default=0)
+        self.end_ns: int = max((one.end_ns for one in filled), default=-1) + 1
         """When the first message came, and just after the last."""
+        count = sum(map(self.count, self.topics))
+        if count < bag.messages and not self.damage:
+            self._lost.append(f'the metadata of {path} tell of {bag.messages} messages, {count} are there')
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Close it."""
-        self._reader.close()
+        self._stack.close()
+
+    @property
+    def damage(self) -> list[str]:
+        """What was left out, and why: complete when every message was read."""
+        return [*self._lost, *(text for file in self._files for text in file.damage)]
+
+    @property
+    def notes(self) -> list[str]:
+        """What is not as it should be, but costs nothing; and where something is amiss, what can be done."""
+        unclosed = [
+            f'{file.name} was not closed: its recorder was killed, or is at work; what it has so far is read'
+            for file in self._files
+            if not file.closed
+        ]
+        hint = [f'`dcdrw mend {self.path} --out NEW` writes what can be read into a new recording']
+        return [*self._notes, *unclosed, *(hint if unclosed or self.damage else [])]
 
     @property
     def parameters(self) -> Path | None:
@@ -78,7 +99,7 @@ class Recording(AbstractContextManager['Recording']):
 
     def count(self, topic: str) -> int:
         """How many messages a topic has."""
-        return sum(c.msgcount for c in self._reader.connections if c.topic == topic)
+        return sum(file.counts.get(topic, 0) for file in self._files)
 
     def find(self, name: str, kind: str = JOINT_STATE) -> str:
         """The topic of this name, in whatever namespace.
@@ -100,56 +121,41 @@ class Recording(AbstractContextManager['Recording']):
             f'of this type it has: {others}'
         )
 
-    def messages(
-        self, topics: Sequence[str], start_ns: int | None = None, stop_ns: int | None = None
-    ) -> Iterator[Message]:
-        """The messages of these topics that came from start to before stop, in the order in which they came.
+    def messages(self, topics: Sequence[str], start_ns: int = _FIRST, stop_ns: int = _LAST) -> Iterator[Message]:
+        """The messages of these topics that came from start to before stop, in the order in which they came."""
+        for file in self._files:
+            if file.start_ns < stop_ns and start_ns <= file.end_ns:
+                yield from file.messages(topics, start_ns, stop_ns)
 
-        Raises:
-            ValueError: the recording is damaged.
-
-        """
-        for connection, log_ns, data in self._read(topics, start_ns, stop_ns):
-            yield Message(connection.topic, log_ns, data)
-
-    def joints(self, topic: str, start_ns: int | None = None, stop_ns: int | None = None) -> Iterator[JointBatch]:
+    def joints(self, topic: str, start_ns: int = _FIRST, stop_ns: int = _LAST) -> Iterator[JointBatch]:
         """The JointState messages of a topic, decoded many at once, and cut where the names or the frame change."""
-        messages = ((log_ns, data) for _, log_ns, data in self._read([topic], start_ns, stop_ns))
+        messages = ((log_ns, data) for _, log_ns, data in self.messages([topic], start_ns, stop_ns))
         for _, group in groupby(messages, lambda message: len(message[1])):
             while batch := list(islice(group, BATCH)):
                 yield from decode_joints([data for _, data in batch], [log_ns for log_ns, _ in batch])
 
-    def _read(self, topics: Sequence[str], start_ns: int | None, stop_ns: int | None) -> Iterator[Any]:
-        connections = [c for c in self._reader.connections if c.topic in topics]
-        if not connections:
-            return
+    def _open(self, path: Path) -> None:
+        """Open a file; one that is none costs only itself where there are others."""
+        from dcdrw.recordings.decompression import unpack_file
+        from dcdrw.recordings.mcap_file import McapFile
+        from dcdrw.recordings.sqlite_file import SqliteFile
+
+        name, inner = str(path), path
         try:
-            yield from self._reader.messages(connections, start_ns, stop_ns)
-        except OSError:
-            raise
-        except Exception as error:  # of any kind, for the content may be anything
-            raise ValueError(f'{self.path} is damaged: {str(error) or type(error).__name__}') from None
+            if path.suffix in COMPRESSIONS:
+                inner = self._scratch() / path.with_suffix('').name
+                trouble = unpack_file(path, inner)
+                if trouble:
+                    self._lost.append(f'{name}: {trouble}')
+            file: BagFile = (
+                McapFile(inner, name) if inner.suffix == '.mcap' else SqliteFile(inner, name, self._scratch())
+            )
+        except (ValueError, OSError) as error:
+            self._lost.append(str(error))
+            return
+        self._stack.callback(file.close)
+        self._files.append(file)
 
-
-def find(path: Path) -> Path:
-    """The folder with metadata.yaml, or the lone file, that a path means.
-
-    Raises:
-        ValueError: there is none.
-
-    """
-    if not path.exists():
-        raise ValueError(f'{path} does not exist')
-    if path.is_file():
-        if path.suffix in ('.mcap', '.db3'):
-            return path
-        raise ValueError(f'{path} is no recording: give its folder, an .mcap or a .db3 file')
-    for folder in (path, path / RECORDING):
-        if (folder / METADATA).exists():
-            return folder
-        files = [file for kind in ('*.mcap', '*.db3') for file in sorted(folder.glob(kind))]
-        if len(files) == 1:
-            return files[0]
-        if files:
-            raise ValueError(f'{folder} has several files but no {METADATA}: run ros2 bag reindex {folder}')
-    raise ValueError(f'{path} is no recording: it has neither {METADATA} nor an .mcap or .db3 file')
+    def _scratch(self) -> Path:
+        """A new folder for copies, which goes when the recording is closed."""
+        return Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix='dcdrw-')))

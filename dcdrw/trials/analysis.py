@@ -81,6 +81,10 @@ class Analysis(NamedTuple):
     """Messages, from the first of `motion` on; those that were refused included."""
     unreadable: str
     """Why the last one that could not be read could not be; empty where all could."""
+    damage: tuple[str, ...] = ()
+    """What of the recording was left out, for it is damaged."""
+    notes: tuple[str, ...] = ()
+    """What else is not as it should be with the recording."""
 
     @property
     def pitch(self) -> float:

@@ -7,8 +7,8 @@ from io import StringIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dcdrw.recordings.recorder import INFORMATION, METADATA, PARAMETERS
-from dcdrw.recordings.recording import find
+from dcdrw.recordings.bag_folder import find_bag
+from dcdrw.recordings.recorder import PARAMETERS
 from dcdrw.trials.analysis import Analysis
 from dcdrw.trials.decay import Decay, fit_decay
 from dcdrw.trials.results import read_trial
@@ -70,14 +70,14 @@ def open_trial(path: Path, name: str, rig: Path | None = None, topic: str = JOIN
 
     """
     analysis, _ = read_trial(path, rig=rig, topic=topic)
-    folder = find(path)
-    folder = folder if folder.is_dir() else folder.parent
+    bag = find_bag(path)
+    folder = bag.path if bag.path.is_dir() else bag.path.parent
     errors = analysis.status.history
     source = _source(folder)
     built = analysis.params.rig
     if source == MEASURED and not rig:
         built = built._replace(k=math.nan, b=math.nan, slope=math.nan)
-    return RecordedTrial(name, analysis, summarize(analysis), source, _about(folder), fit_decay(errors), built)
+    return RecordedTrial(name, analysis, summarize(analysis), source, _about(bag.about), fit_decay(errors), built)
 
 
 def table(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
@@ -125,9 +125,5 @@ def _source(folder: Path) -> str:
     return SIMULATED if isinstance(content, dict) and 'simulator' in content else MEASURED
 
 
-def _about(folder: Path) -> dict[str, str]:
-    try:
-        about = read_yaml(folder / METADATA)[INFORMATION].get('custom_data') or {}
-    except (OSError, ValueError, LookupError, TypeError, AttributeError):
-        return {}
-    return {name: str(value) for name, value in about.items() if name != 'parameters' and value}
+def _about(about: dict[str, str]) -> dict[str, str]:
+    return {name: value for name, value in about.items() if name != 'parameters' and value}

@@ -48,7 +48,8 @@ def read_trial(
         trial = analyze(batches, params)
         if trial.unreadable and not len(trial.motion.stamp_ns):
             raise ValueError(f'{path}: {name}: {trial.unreadable} (front_joint and rear_joint in a rig file name them)')
-        return trial, compare(recording, trial, name.rpartition('/')[0])
+        agreements = compare(recording, trial, name.rpartition('/')[0])
+        return trial._replace(damage=tuple(recording.damage), notes=tuple(recording.notes)), agreements
 
 
 def _joint_states(recording: Recording, topic: str, rig: Path | None) -> tuple[str, Iterable[JointBatch]]:

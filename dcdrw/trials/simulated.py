@@ -9,8 +9,9 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from dcdrw.recordings.bag_folder import RECORDING
 from dcdrw.recordings.recorder import RecorderParams
-from dcdrw.recordings.recording import RECORDING, Recording
+from dcdrw.recordings.recording import Recording
 from dcdrw.suite.executables import RECORDER, SIMULATOR, TAG_TRACKER, TRIAL, VIRTUAL_CAMERA, Executable
 from dcdrw.suite.parameter_file import TrialParams, write_parameter_file
 from dcdrw.suite.processes import NodeProcess

@@ -50,6 +50,8 @@ class Summary(NamedTuple):
     """The wheels that have stalled."""
     duration_s: float | None
     samples: Samples
+    damage: tuple[str, ...]
+    """What of the recording was left out, for it is damaged."""
     parameters: dict[str, dict[str, Any]]
     """Of each node; None where derived from others."""
 
@@ -80,6 +82,7 @@ def summarize(trial: Analysis) -> Summary:
         stalled=status.stalled,
         duration_s=_known(seconds[-1]) if len(seconds) else 0.0,
         samples=Samples(trial.joint_states, len(seconds), status.cadence.gaps, status.cadence.lost),
+        damage=trial.damage,
         parameters={name: flatten(values) for name, values in trial.params._asdict().items()},
     )
 

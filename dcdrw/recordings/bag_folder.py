@@ -1,0 +1,126 @@
+"""Which files a recording consists of, and what its metadata tell of them."""
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from dcdrw.recordings.recorder import INFORMATION, METADATA
+from dcdrw_msgs_py.yaml_file import read_yaml
+
+RECORDING = 'recording'
+"""The folder of the recording within that of a trial."""
+STORAGES = ('.mcap', '.db3')
+COMPRESSIONS = ('.zstd', '.zst')
+"""Endings of files that are compressed as a whole."""
+_PART = re.compile(r'(.*)_(\d+)')
+
+
+class Bag(NamedTuple):
+    """The files of a recording."""
+
+    path: Path
+    """Its folder, or its lone file."""
+    files: list[Path]
+    notes: list[str]
+    """What in its folder is not as it should be."""
+    about: dict[str, str]
+    """rosbag2's custom_data."""
+    messages: int
+    """How many the metadata tell of."""
+
+
+def find_bag(path: Path) -> Bag:
+    """The recording that a path means: its folder, that of a trial, or one of its files.
+
+    Raises:
+        ValueError: there is none.
+        OSError: the folder cannot be read.
+
+    """
+    if not path.exists():
+        raise ValueError(f'{path} does not exist')
+    if not path.is_dir():
+        if not is_storage(path):
+            raise ValueError(
+                f'{path} is no recording: give its folder, or a file that ends in {", ".join(STORAGES)}, '
+                f'or one of these and {COMPRESSIONS[0]}'
+            )
+        return Bag(path, [path], [], {}, 0)
+    for folder in (path, path / RECORDING):
+        files = sorted((file for file in folder.glob('*') if file.is_file() and is_storage(file)), key=_number)
+        files = [file for file in files if not (file.suffix in COMPRESSIONS and file.with_suffix('') in files)]
+        if files:
+            return _described(folder, files)
+    if (path / METADATA).exists():
+        raise ValueError(f'{path} has {METADATA} but none of the files that this tells of')
+    raise ValueError(f'{path} is no recording: it has no {", ".join(f"*{end}" for end in STORAGES)} file')
+
+
+def is_storage(path: Path) -> bool:
+    """Whether a name is that of a recording's file."""
+    return (path.with_suffix('') if path.suffix in COMPRESSIONS else path).suffix in STORAGES
+
+
+def _described(folder: Path, files: list[Path]) -> Bag:
+    """The files of a folder, as its metadata tell, where they can be read and tell of what is there."""
+    told, notes = _metadata(folder / METADATA)
+    names = told.get('relative_file_paths')
+    named = [file for name in (names if isinstance(names, list) else []) if (file := _named(str(name), files))]
+    missing = [str(name) for name in names if not _named(str(name), files)] if isinstance(names, list) else []
+    if missing:
+        others = [file for file in files if file not in named]
+        notes.append(
+            f'{METADATA} of {folder} names {_list(missing)}, which is not there'
+            + (f'; {_list(file.name for file in others)} is read in its place' if others else '')
+        )
+        named = files
+    elif not named:
+        if len({match[1] if (match := _PART.fullmatch(_stem(file))) else _stem(file) for file in files}) > 1:
+            raise ValueError(
+                f'{folder} has several recordings and no {METADATA}: give one of {_list(file.name for file in files)}'
+            )
+        named = files
+    about = told.get('custom_data')
+    count = told.get('message_count')
+    return Bag(
+        folder,
+        named,
+        notes,
+        {str(name): str(value) for name, value in about.items()} if isinstance(about, dict) else {},
+        count if isinstance(count, int) else 0,
+    )
+
+
+def _metadata(path: Path) -> tuple[dict[str, Any], list[str]]:
+    """What metadata.yaml says, and what is wrong with it."""
+    if not path.exists():
+        return {}, []
+    try:
+        content = read_yaml(path)
+    except ValueError as error:
+        return {}, [f'{error}; the recording is read without it']
+    told = content.get(INFORMATION) if isinstance(content, dict) else None
+    return (
+        (told, []) if isinstance(told, dict) else ({}, [f'{path} is none of rosbag2; the recording is read without it'])
+    )
+
+
+def _named(name: str, files: list[Path]) -> Path | None:
+    """The file of this name, compressed or not; rosbag2 once wrote the folder before it."""
+    wanted = Path(name).name
+    same = (wanted, *(wanted + end for end in COMPRESSIONS), *(wanted.removesuffix(end) for end in COMPRESSIONS))
+    return next((file for name in same for file in files if file.name == name), None)
+
+
+def _stem(file: Path) -> str:
+    return (file.with_suffix('') if file.suffix in COMPRESSIONS else file).stem
+
+
+def _number(file: Path) -> tuple[str, int]:
+    match = _PART.fullmatch(_stem(file))
+    return (match[1], int(match[2])) if match and len(match[2]) < 20 else (_stem(file), -1)
+
+
+def _list(names: Iterable[str]) -> str:
+    return ', '.join(names)

@@ -1,0 +1,86 @@
+"""Decompression that stays within bounds, whatever the compressed bytes claim to hold."""
+
+import shutil
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, BinaryIO
+
+LARGEST = 256 * 2**20
+"""Longest chunk, and longest message, that is read [bytes]."""
+ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
+_BLOCK = 2**17
+_HIGHEST_RATIO = 1000
+_ALWAYS_ALLOWED = 256 * 2**20
+_KEPT_FREE = 64 * 2**20
+"""What a decompressed file leaves of its disk."""
+
+
+def decompress(data: bytes, compression: str, size: int = LARGEST) -> bytes:
+    """Decompress a chunk or a message.
+
+    Args:
+        data: the compressed bytes.
+        compression: `zstd`, `lz4`, or empty for none.
+        size: longest output.
+
+    Returns:
+        What could be decompressed: less than there should be where the data are damaged, never more than `size` and one
+        byte, which tells that there would be more.
+
+    """
+    if not compression:
+        return data[: size + 1]
+    parts: list[bytes] = []
+    left = size + 1
+    with suppress(Exception):  # of any kind, for the content may be anything
+        stream = _stream(data, compression)
+        while left and (part := stream.read(min(left, _BLOCK))):
+            parts.append(part)
+            left -= len(part)
+    return b''.join(parts)
+
+
+def unpack_file(source: Path, target: Path) -> str:
+    """Decompress a zstd file, and keep what comes before damage.
+
+    Returns:
+        What is wrong with the file; empty where nothing is.
+
+    Raises:
+        OSError: the file cannot be read or there is no room for its content.
+        ValueError: it grows out of all proportion.
+
+    """
+    most = max(_ALWAYS_ALLOWED, _HIGHEST_RATIO * source.stat().st_size)
+    written = 0
+    with source.open('rb') as packed, target.open('wb') as out:
+        stream = _stream(packed, 'zstd')
+        while True:
+            try:
+                part = stream.read(_BLOCK)
+            except OSError:
+                raise
+            except Exception as error:  # of any kind, for the content may be anything
+                return f'its compressed data end in damage after {written} bytes ({error})'
+            if not part:
+                return ''
+            written += len(part)
+            if written > most:
+                raise ValueError(f'{source} grows beyond {_HIGHEST_RATIO} times its size when it is decompressed')
+            if shutil.disk_usage(target.parent).free < _KEPT_FREE:
+                raise OSError(
+                    28, f'no room to decompress {source.name} (TMPDIR names another place)', str(target.parent)
+                )
+            out.write(part)
+
+
+def _stream(data: bytes | BinaryIO, compression: str) -> Any:
+    if compression == 'zstd':
+        from zstandard import ZstdDecompressor
+
+        return ZstdDecompressor().stream_reader(data, read_across_frames=True)
+    from io import BytesIO
+
+    from lz4.frame import LZ4FrameFile
+
+    return LZ4FrameFile(BytesIO(data) if isinstance(data, bytes) else data)

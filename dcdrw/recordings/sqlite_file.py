@@ -1,0 +1,244 @@
+"""sqlite3 files of rosbag2, read whatever befell them, and without a trace beside them.
+
+sqlite3 itself would lock the file, and write where a recorder was killed: it rolls back or forward what stands in the
+file's journal. So a file with a journal is copied with it, and the copy is opened.
+"""
+
+import shutil
+import sqlite3
+from collections.abc import Collection, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from dcdrw.recordings.bag_file import CDR, BagFile, Message, RecordedTopic
+from dcdrw.recordings.decompression import LARGEST
+
+JOURNALS = ('-wal', '-journal')
+_MAGIC = b'SQLite format 3\0'
+_ROWS = 512
+"""Rows that are asked for at once."""
+_STEPS = 100_000
+"""Instructions of sqlite3 between two looks at how many it has taken."""
+_MOST_COPIES = 5
+_MOST_GAPS = 1000
+"""Damaged stretches after which the rest is given up: seconds."""
+_LAST_ID = 2**63 - 1
+_LIMIT_LENGTH = 0
+"""SQLITE_LIMIT_LENGTH, which Python names from 3.11 on."""
+
+
+class SqliteFile(BagFile):
+    """An open sqlite3 file.
+
+    Args:
+        path: of the file.
+        name: of the file as it was given.
+        scratch: an empty folder for a copy, which the caller removes.
+
+    Raises:
+        ValueError: it is no recording.
+        OSError: it cannot be read, or not be copied.
+
+    """
+
+    def __init__(self, path: Path, name: str, scratch: Path) -> None:
+        super().__init__(path, name)
+        with path.open('rb') as file:
+            start = file.read(64)
+        if start.startswith(b'version https://git-lfs'):
+            raise ValueError(f'{name} is a pointer of Git LFS, not the recording itself: run git lfs pull')
+        journals = [journal for journal in _journals(path) if journal.stat().st_size]
+        if not journals and not start.startswith(_MAGIC):
+            raise ValueError(f'{name} is {"no sqlite3 file" if start else "empty"}')
+        if journals:
+            path = _copy(path, scratch / 'copy.db3')
+        self.closed = not journals
+        self._size = path.stat().st_size + sum(journal.stat().st_size for journal in _journals(path))
+        uri = f'{path.resolve().as_uri()}?{"mode=rw" if journals else "mode=ro&immutable=1"}'
+        self._steps = 0
+        self._connection = sqlite3.connect(uri, uri=True, isolation_level=None, check_same_thread=False)
+        try:
+            self._open()
+        except (sqlite3.Error, UnicodeError, OverflowError, TypeError) as error:
+            self.close()
+            raise ValueError(f'{name} cannot be read: {error}') from None
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Close it."""
+        self._connection.close()
+
+    def messages(self, topics: Collection[str], start_ns: int, stop_ns: int) -> Iterator[Message]:
+        """The messages of these topics from start to before stop, in the order in which they came."""
+        wanted = {key: name for key, name in self._names.items() if name in topics}
+        for key, log_ns, data in self._rows(wanted, start_ns, min(stop_ns, _LAST_ID)):
+            whole = self._whole(data) if isinstance(data, bytes) and isinstance(log_ns, int) else b''
+            if whole:
+                yield Message(wanted[key], log_ns, whole)
+            else:
+                self._damage.setdefault('message', f'{self.name}: a message is damaged')
+
+    def _open(self) -> None:
+        connection = self._connection
+        connection.set_progress_handler(self._tire, _STEPS)
+        connection.execute('PRAGMA trusted_schema = OFF')
+        connection.execute('PRAGMA cell_size_check = ON')
+        if hasattr(connection, 'setlimit'):
+            connection.setlimit(_LIMIT_LENGTH, LARGEST)
+        tables = {name for name, kind in self._query('SELECT name, type FROM sqlite_master') if kind == 'table'}
+        if not {'topics', 'messages'} <= tables:
+            raise ValueError(f'{self.name} is no recording: it has no table of topics, or none of messages')
+        self._names: dict[int, str] = {}
+        definitions: dict[str, tuple[str, str]] = {}
+        if 'message_definitions' in tables:
+            with suppress(sqlite3.Error, ValueError):
+                definitions = {
+                    str(kind): (str(text), str(form))
+                    for kind, form, text in self._query(
+                        'SELECT topic_type, encoding, encoded_message_definition FROM message_definitions'
+                    )
+                }
+        known = {row[1] for row in self._query('PRAGMA table_info(topics)')}
+        columns = ('id', 'name', 'type', 'serialization_format', 'offered_qos_profiles', 'type_description_hash')
+        asked = ', '.join(column if column in known else "''" for column in columns)
+        for key, name, kind, form, qos, digest in self._query(f'SELECT {asked} FROM topics'):
+            self._names[key] = str(name)
+            self.topics[str(name)] = RecordedTopic(
+                str(name), str(kind), str(digest), str(qos), *definitions.get(str(kind), ('', '')), str(form) or CDR
+            )
+        try:
+            counts = self._query('SELECT topic_id, count(*), min(timestamp), max(timestamp) FROM messages GROUP BY 1')
+            self._count([row for row in counts if row[0] in self._names])
+            self._orderly = self._is_indexed(sum(row[1] for row in counts))
+        except (sqlite3.Error, TypeError):
+            self._orderly = False
+            self._count([(key, 1, log_ns, log_ns) for key, log_ns, _ in self._salvage()])
+
+    def _count(self, rows: Collection[tuple[int, int, int, int]]) -> None:
+        """Take counts and times by topic."""
+        self.counts = dict.fromkeys(self.topics, 0)
+        for key, count, _, _ in rows:
+            self.counts[self._names[key]] += count
+        if rows:
+            self.start_ns, self.end_ns = min(row[2] for row in rows), max(row[3] for row in rows)
+
+    def _is_indexed(self, rows: int) -> bool:
+        """Whether the index by time, where there is one, names every row."""
+        for _, index, *_ in self._query('PRAGMA index_list(messages)'):
+            if [column for _, _, column in self._query(f'PRAGMA index_info("{index}")')][:1] == ['timestamp']:
+                return bool(self._query(f'SELECT count(*) FROM messages INDEXED BY "{index}"') == [(rows,)])
+        return True
+
+    def _rows(self, wanted: Collection[int], start_ns: int, stop_ns: int) -> Iterator[tuple[int, int, Any]]:
+        """Topic, time and data of each row, by time; where the file is damaged, in the order of their writing."""
+        last = start_ns - 1
+        if self._orderly:
+            try:
+                keys = ', '.join(str(int(key)) for key in wanted)
+                self._steps = 0
+                for row in self._connection.execute(
+                    'SELECT topic_id, timestamp, data FROM messages WHERE timestamp >= ? AND timestamp < ? '
+                    f'AND topic_id IN ({keys}) ORDER BY timestamp, id',
+                    (start_ns, stop_ns),
+                ):
+                    last = max(last, row[1])
+                    self._steps = 0
+                    yield row
+                return
+            except (sqlite3.Error, UnicodeError) as error:
+                self._damage.setdefault('order', f'{self.name}: {error}')
+        for key, log_ns, data in self._salvage():
+            if key in wanted and last < log_ns < stop_ns:
+                yield key, log_ns, data
+
+    def _salvage(self) -> Iterator[tuple[int, int, Any]]:
+        """Every row that can be read, in the order of their numbers: a damaged page costs its own rows alone."""
+        at, count = -_LAST_ID - 1, _ROWS
+        for _ in range(_MOST_GAPS):
+            while (rows := self._look_up(at, count)) is not None:
+                number = at
+                for key, topic, log_ns, data in rows:
+                    if key >= at and isinstance(log_ns, int):
+                        at = key + 1
+                        if topic in self._names:
+                            yield topic, log_ns, data
+                if at == number:
+                    return
+                count = min(2 * count, _ROWS)
+            if count > 1:
+                count = 1
+                continue
+            found = self._next_readable(at)
+            self._damage[at] = (
+                f'{self.name}: the rows from number {max(at, 0)} {f"to {found - 1}" if found else "on"} are damaged'
+            )
+            if found is None:
+                return
+            at = found
+        self._damage['more'] = f'{self.name}: the rest is too badly damaged to be searched'
+
+    def _next_readable(self, at: int) -> int | None:
+        """The least number after a row that cannot be read from which on there is one that can; None for no more."""
+        start = bad = max(at, 0)  # rosbag2 counts from 1
+        good = start + (at >= 0)
+        while self._look_up(good, 1) is None:
+            bad, good = good, good + 1 + (good - start) // 8  # a whole page between two damaged ones is found
+            if good > _LAST_ID:
+                return None
+        while good - bad > 1:
+            middle = (bad + good) // 2
+            if self._look_up(middle, 1) is None:
+                bad = middle
+            else:
+                good = middle
+        return good
+
+    def _look_up(self, number: int, count: int) -> list[Any] | None:
+        """So many rows from this number on; None where one of them cannot be read."""
+        try:
+            return self._query(
+                'SELECT id, topic_id, timestamp, data FROM messages WHERE id >= ? ORDER BY id LIMIT ?', (number, count)
+            )
+        except (sqlite3.Error, UnicodeError):
+            return None
+
+    def _query(self, text: str, values: tuple[Any, ...] = ()) -> list[Any]:
+        self._steps = 0
+        return self._connection.execute(text, values).fetchall()
+
+    def _tire(self) -> bool:
+        """Whether a query has taken more steps than any honest one over a file of this size."""
+        self._steps += _STEPS
+        return self._steps > 10_000_000 + 10 * self._size
+
+
+def _journals(path: Path) -> list[Path]:
+    return [journal for journal in (path.with_name(path.name + end) for end in JOURNALS) if journal.exists()]
+
+
+def _copy(path: Path, target: Path) -> Path:
+    """Copy a file with its journals, as they stand together.
+
+    Raises:
+        OSError: there is no room, say.
+
+    """
+    for _ in range(_MOST_COPIES):
+        before = path.stat()
+        try:
+            shutil.copyfile(path, target)
+            for journal in _journals(path):
+                shutil.copyfile(journal, target.with_name(target.name + journal.name[len(path.name) :]))
+        except OSError as error:
+            raise OSError(
+                error.errno,
+                f'{error.strerror}: cannot be copied to {target.parent} (TMPDIR names another place)',
+                str(path),
+            ) from None
+        after = path.stat()
+        if (before.st_size, before.st_mtime_ns) == (after.st_size, after.st_mtime_ns):
+            break
+    return target
