@@ -1,10 +1,10 @@
 import math
 
 import pytest
+from legs import DATA, RATE
 
 from dcdrw_control.legs.csv_file import read_legs
 from dcdrw_control.legs.samples import ContactReading, HipReading, ImuReading, Leg, LegReading, WrenchReading
-from tests.control.legs.gait import DATA, RATE
 
 LEFT, RIGHT = Leg('front', 'left'), Leg('front', 'right')
 

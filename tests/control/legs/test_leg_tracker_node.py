@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from geometry_msgs.msg import WrenchStamped
+from legs import person, truth
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool
 
@@ -24,7 +25,6 @@ from dcdrw_msgs_py.topics import (
     SYNCHRONIZED,
 )
 from tests.bench import Bench
-from tests.control.legs.gait import person, truth
 
 pytestmark = pytest.mark.processes
 
