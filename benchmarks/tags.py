@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dcdrw.commands.film import Shots
+from dcdrw.trials.shots import Shots
 from dcdrw_msgs_py.frame import Picture
 from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams

@@ -1,17 +1,9 @@
 """The command `dcdrw`: which commands there are. The module of one is imported when it is chosen."""
 
 import sys
-from typing import NamedTuple
 
+from dcdrw.commands import Command
 from dcdrw.entry import EXECUTABLES
-
-
-class Command(NamedTuple):
-    """One command: `add_arguments` of its module describes it and declares what it takes, `run` runs it."""
-
-    module: str
-    help: str
-
 
 COMMANDS = {
     'trial': Command('trial', 'run a trial in simulation, live, and judge it'),

@@ -1,6 +1,8 @@
 """Reads the command line and runs the command that it names."""
 
 import argparse
+import errno
+import os
 import signal
 import sys
 import threading
@@ -10,7 +12,8 @@ from difflib import get_close_matches
 from importlib import import_module
 from typing import Any, NoReturn
 
-from dcdrw.cli import Command
+from dcdrw.commands import Command
+from dcdrw.console import Interrupted
 
 
 class CommandParser(argparse.ArgumentParser):
@@ -41,14 +44,6 @@ class CommandParser(argparse.ArgumentParser):
         """As argparse has it, once the arguments are known."""
         self.load()
         return super().parse_known_args(args, namespace)
-
-
-class Interrupted(KeyboardInterrupt):
-    """A signal asked for an end."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__()
-        self.number = number
 
 
 class CommandLine:
@@ -90,9 +85,20 @@ class CommandLine:
         except KeyboardInterrupt as interrupt:
             print(f'{prog}: interrupted', file=sys.stderr)
             return 128 + getattr(interrupt, 'number', signal.SIGINT)
+        except BrokenPipeError:  # whoever read has seen enough
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 128 + signal.SIGPIPE
         except (ValueError, OSError) as error:
-            print(f'{prog}: {error}', file=sys.stderr)
+            print(f'{prog}: {_in_words(error)}', file=sys.stderr)
             return 2
+
+
+def _in_words(error: ValueError | OSError) -> str:
+    """An error without the system's numbers."""
+    if not isinstance(error, OSError) or not error.strerror:
+        return str(error)
+    reason = 'there is no such file or folder' if error.errno == errno.ENOENT else error.strerror.lower()
+    return f'{error.filename}: {reason}' if error.filename else reason
 
 
 def _suggestion(word: str, known: Mapping[str, Any] | Sequence[str]) -> str:

@@ -24,6 +24,7 @@ KEYS = {
     'cv2': 'python3-opencv',
     'matplotlib': 'python3-matplotlib',
     'numpy': 'python3-numpy',
+    'rich': 'python3-rich',
     'scipy': 'python3-scipy',
     'yaml': 'python3-yaml',
 }
@@ -37,7 +38,6 @@ OPTIONAL = {
     'numba',
     'pupil_apriltags',
     'rosbags',
-    'tqdm',
     'xarray',
     'zstandard',
 }

@@ -4,6 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from dcdrw.files import add_force, free_folder
 from dcdrw.trials.results import describe, read_trial, write_results
 from dcdrw.trials.summary import sentence
 from dcdrw_msgs_py.topics import JOINT_STATES
@@ -40,6 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='DIR',
         help='write summary, picture, samples and footfalls here, or into a folder for each',
     )
+    add_force(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -50,8 +52,8 @@ def run(options: argparse.Namespace) -> int:
         else [options.out and options.out / _name(path) for path in options.recordings]
     )
     for folder in filter(None, folders):
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            raise ValueError(f'{folder} exists already, not overwriting; choose another --out')
+        if not options.force:
+            free_folder(folder)
         if folders.count(folder) > 1:
             raise ValueError(f'several recordings are called {folder.name}: analyze them one by one')
     several, status = len(options.recordings) > 1, 0
@@ -72,8 +74,7 @@ def run(options: argparse.Namespace) -> int:
         for topic, (recorded, equal) in agreements.items():
             print(f'{prefix}{topic}: {equal} of {recorded} recorded are the same here to the last bit')
         if folder:
-            folder.mkdir(parents=True, exist_ok=True)
-            write_results(trial, folder, recording=str(path), agreement=describe(agreements))
+            write_results(trial, folder, {'recording': str(path), 'agreement': describe(agreements)}, options.force)
             print(f'{prefix}written: {folder}/')
     return status
 

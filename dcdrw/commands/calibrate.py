@@ -8,8 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dcdrw.commands.track import Film, add_film_arguments
+from dcdrw.console import Interrupted
+from dcdrw.files import add_force, refuse_existing, write_whole
 from dcdrw.suite.parameter_file import write_changed
+from dcdrw.trials.filmed import Film, add_film_arguments
 from dcdrw_msgs_py.rig import FRONT, REAR, WheelShape
 from dcdrw_msgs_py.tagging import TagGroup
 from dcdrw_tracker.node.tag_tracker import Tracked
@@ -38,7 +40,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = 'From a video of one roll to a rig file.'
     parser.epilog = _EPILOG
     add_film_arguments(parser)
-    parser.add_argument('--out', type=Path, required=True, metavar='OUT.yaml', help='the rig file; must not exist')
+    parser.add_argument('--out', type=Path, required=True, metavar='OUT.yaml', help='the rig file')
+    add_force(parser)
     parser.add_argument(
         '--learn-slope',
         action='store_true',
@@ -48,12 +51,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
-    if options.out.exists():
-        raise ValueError(f'{options.out} exists already, not overwriting; choose another --out')
+    refuse_existing([options.out], options.force)
     film = Film(options)
     frames = [tracked for _, tracked in film.track()]
     if film.interrupted:
-        raise KeyboardInterrupt
+        raise Interrupted(film.interrupted[0])
     film.check()
     track = film.params.track
     views, axes = _views(film, frames)
@@ -63,7 +65,8 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f'{film.path}: {error}') from None
     changes = dict(_changes(film, found, axes, options.learn_slope))
     _tell(film, found, changes)
-    write_changed(options.rig, changes, options.out, f'Calibrated by dcdrw calibrate from {film.path.name}.')
+    with write_whole(options.out, options.force) as path:
+        write_changed(options.rig, changes, path, f'Calibrated by dcdrw calibrate from {film.path.name}.')
     print(f'Written: {options.out}')
     return 0
 

@@ -2,9 +2,7 @@
 
 import argparse
 import csv
-import json
 import math
-import sys
 from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
@@ -12,11 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dcdrw.arguments import count, number, positive
+from dcdrw.console import Bar, add_json, check_json, count, number, positive, tell, tell_where
 from dcdrw.drawings.design_card import draw_card
+from dcdrw.files import add_force, refuse_existing, to_json, write_text, write_whole
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params
 from dcdrw_msgs_py.quantity import build, flatten
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_sim.figures.style import new_figure, save
 from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.study.design import (
     CASES,
@@ -43,6 +43,7 @@ STIFFNESS = 1e-4, 1.0
 DAMPING = 1e-2, 1e2
 MOST_PARTS = 20_000
 """Pairs of parts that are judged in minutes."""
+CARDS = 'card.pdf', 'card.png'
 FASTEST, FORGIVING, GIVEN = 'fastest', 'most forgiving', 'given'
 
 _EPILOG = """\
@@ -102,6 +103,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="in step is within ± this of 50 %% (default: %(default)g, the monitor's)",
     )
     parser.add_argument('--out', type=Path, metavar='DIR', help='write card.pdf, card.png and design.json there')
+    add_json(parser)
+    add_force(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -115,27 +118,34 @@ def run(options: argparse.Namespace) -> int:
     task = _task(options)
     tolerance = options.tolerance / 100.0
     parts = read_parts(options.available) if options.available else []
+    check_json(options)
     if options.out:
-        options.out.mkdir(parents=True, exist_ok=True)
-    with _Progress() as progress:
+        new_figure(1, 1, 'a card')
+        refuse_existing([options.out / name for name in ('design.json', *CARDS)], options.force)
+    with Bar('judging', 'couplers') as bar:
         k, b = _bounds(options, task.rig)
         if parts:
-            grid = score(task, *mesh(k, b), report=progress.among(GRID**2))
-            pairs = _best_parts(task, parts, tolerance, progress)
+            bar.begin(GRID**2)
+            grid = score(task, *mesh(k, b), report=bar.more)
+            pairs = _best_parts(task, parts, tolerance, bar)
         else:
-            grid, *pairs = search(task, k, b, tolerance, progress.among(WORK))
+            bar.begin(WORK)
+            grid, *pairs = search(task, k, b, tolerance, bar.more)
     chosen = {name: assess(task, *pair, tolerance) for name, pair in zip((FASTEST, FORGIVING), pairs, strict=True)}
     if options.k:
         chosen[GIVEN] = assess(task, options.k, options.b, tolerance)
-    print('\n'.join(report(task, chosen, parts, tolerance)))
+    found = record(task, chosen, parts, tolerance)
+    tell(options, report(task, chosen, parts, tolerance), found)
     if options.out:
-        content = json.dumps(record(task, chosen, parts, tolerance), indent=1, ensure_ascii=False)
-        (options.out / 'design.json').write_text(content + '\n', encoding='utf-8')
-        for name in ('card.pdf', 'card.png'):
-            draw_card(
-                _rig_line(task), _texts(task, chosen, parts, tolerance), task, grid, chosen, parts, options.out / name
-            )
-        print(f'\nThe card and all numbers are in {options.out}.')
+        options.out.mkdir(parents=True, exist_ok=True)
+        write_text(options.out / 'design.json', to_json(found), options.force)
+        texts = _texts(task, chosen, parts, tolerance)
+        on_sale = {kind: [part.value for part in _of(parts, kind)] for kind in ('spring', 'dashpot')}
+        card = draw_card(_rig_line(task), texts, task, grid, chosen, on_sale)
+        for name in CARDS:
+            with write_whole(options.out / name, options.force) as unfinished:
+                save(card, unfinished)
+        tell_where(options, f'\nThe card and all numbers are in {options.out}.')
     return 0
 
 
@@ -198,7 +208,7 @@ def _bounds(options: argparse.Namespace, rig: RigParams) -> Iterator[tuple[float
         yield low, high
 
 
-def _best_parts(task: Task, parts: list[Part], tolerance: float, progress: '_Progress') -> list[tuple[float, float]]:
+def _best_parts(task: Task, parts: list[Part], tolerance: float, bar: Bar) -> list[tuple[float, float]]:
     ks, bs = (
         np.array(column)
         for column in zip(
@@ -206,8 +216,10 @@ def _best_parts(task: Task, parts: list[Part], tolerance: float, progress: '_Pro
             strict=True,
         )
     )
-    first = score(task, ks, bs, report=progress.among(len(ks))).order()[0]
-    near = forgiving_order(task, ks, bs, tolerance, progress.among(len(ks) * CASES))[0]
+    bar.begin(len(ks))
+    first = score(task, ks, bs, report=bar.more).order()[0]
+    bar.begin(len(ks) * CASES)
+    near = forgiving_order(task, ks, bs, tolerance, bar.more)[0]
     return [(float(ks[index]), float(bs[index])) for index in (first, near)]
 
 
@@ -378,27 +390,3 @@ def _number(steps: float) -> str:
 
 def _known(value: float) -> float | None:
     return None if math.isnan(value) else value
-
-
-class _Progress:
-    """Progress on a terminal: how many of the couplers of the present part are judged."""
-
-    def __enter__(self) -> '_Progress':
-        self._shown = sys.stderr.isatty()
-        return self
-
-    def among(self, total: int) -> Any:
-        """A report for a part of the work."""
-        done = 0
-
-        def report(more: int) -> None:
-            nonlocal done
-            done += more
-            if self._shown:
-                print(f'\rjudging couplers: {done} of {total}', end='', file=sys.stderr, flush=True)
-
-        return report
-
-    def __exit__(self, *_: object) -> None:
-        if self._shown:
-            print('\r\033[K', end='', file=sys.stderr, flush=True)

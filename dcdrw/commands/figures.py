@@ -11,9 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import dcdrw_sim
-from dcdrw.canvas import new_figure
-from dcdrw.commands.sweep import Bar
+from dcdrw.console import Bar, cores
+from dcdrw.drawings.figure_files import add_formats, figure_files, write_figure
+from dcdrw.files import add_force, refuse_existing
 from dcdrw_sim.figures import model_figures, regime_figures, sweep_figures
+from dcdrw_sim.figures.style import new_figure
 from dcdrw_sim.map.return_map import ReturnMap
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.rig.simulator import SimulatorParams
@@ -40,7 +42,7 @@ again; one that was interrupted goes on where it was.
 
 examples:
   dcdrw figures --out figures                          all of them
-  dcdrw figures --out figures --only regimes basin --format pdf
+  dcdrw figures --out figures --only regimes basin --format png,pdf
   dcdrw figures --out figures --quick                  coarse, in some seconds
 """
 
@@ -55,9 +57,9 @@ class Book(NamedTuple):
         """The Dataset of a sweep, computed unless it is kept already."""
         path = self.cache / f'{name}-{_key(sweep)}.nc'
         if not is_complete(path, sweep):
-            with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as executor, Bar(name) as bar:
+            with ThreadPoolExecutor(cores()) as executor, Bar(name, 'points') as bar:
                 try:
-                    run_sweep(sweep, path, executor, len(os.sched_getaffinity(0)) + 1, bar)
+                    run_sweep(sweep, path, executor, cores() + 1, lambda progress: bar.reach(*progress))
                 except KeyboardInterrupt:
                     executor.shutdown(cancel_futures=True)
                     raise
@@ -74,25 +76,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = 'Draw every simulated figure of the paper, its method mended, from sweeps that are kept.'
     parser.epilog = _EPILOG.format(figures=listed)
     parser.add_argument('--out', type=Path, required=True, metavar='DIR', help='where to put them')
+    add_force(parser)
     parser.add_argument(
         '--only', nargs='+', choices=FIGURES, metavar='NAME', default=list(FIGURES), help='some of them only'
     )
-    parser.add_argument('--format', choices=('png', 'pdf', 'svg'), default='png', help='(default: %(default)s)')
+    add_formats(parser)
     parser.add_argument('--quick', action='store_true', help='coarse sweeps: to look, not to print')
     parser.add_argument('--cache', type=Path, metavar='DIR', help='where to keep sweeps (default: ~/.cache/dcdrw)')
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
-    require_extra('xarray', 'netCDF4', 'dask.array', 'tqdm')
+    require_extra('xarray', 'netCDF4', 'dask.array')
     new_figure(1, 1, 'a figure')
-    options.out.mkdir(parents=True, exist_ok=True)
+    names = dict.fromkeys(options.only)
+    refuse_existing(figure_files(options.out, names, options.formats), options.force)
     book = Book(options.cache or _default_cache(), options.quick)
     book.cache.mkdir(parents=True, exist_ok=True)
-    for name in dict.fromkeys(options.only):
-        path = options.out / f'{name}.{options.format}'
-        FIGURES[name](book).savefig(path, dpi=160)
-        print(path)
+    for name in names:
+        for path in write_figure(FIGURES[name](book), options.out, name, options.formats, options.force):
+            print(path)
     return 0
 
 

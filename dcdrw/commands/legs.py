@@ -4,7 +4,8 @@ import argparse
 import math
 from pathlib import Path
 
-from dcdrw.arguments import positive
+from dcdrw.console import add_json, check_json, positive, tell, tell_where
+from dcdrw.files import add_force, free_folder
 from dcdrw.trials.leg_walk import read_walk, sentences, summarize_walk, write_walk
 
 _EPILOG = """\
@@ -30,19 +31,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--rate', type=positive, default=math.nan, metavar='HZ', help='of a .csv that does not tell its times'
     )
     parser.add_argument('--rig', type=Path, metavar='FILE.yaml', help='parameters of leg_tracker that differ')
-    parser.add_argument('--out', type=Path, metavar='DIR', help='write the results here; must not exist, or be empty')
+    parser.add_argument('--out', type=Path, metavar='DIR', help='write the results here')
+    add_json(parser)
+    add_force(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     folder = options.out
-    if folder and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise ValueError(f'{folder} exists already, not overwriting; choose another --out')
+    check_json(options)
+    if folder and not options.force:
+        free_folder(folder)
     walk = read_walk(options.file, options.rate, options.rig)
-    for line in sentences(summarize_walk(walk)):
-        print(line)
+    summary = summarize_walk(walk)
+    tell(options, sentences(summary), summary)
     if folder:
-        folder.mkdir(parents=True, exist_ok=True)
-        write_walk(walk, folder, source=str(options.file))
-        print(f'Written: {folder}/')
+        write_walk(walk, folder, str(options.file), options.force)
+        tell_where(options, f'Written: {folder}/')
     return 0

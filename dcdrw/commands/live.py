@@ -5,18 +5,16 @@ import gc
 import os
 import secrets
 import shutil
-import signal
 import socket
 import sys
 import tempfile
 import webbrowser
 from contextlib import ExitStack
-from importlib import import_module
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
-from dcdrw.arguments import domain
+from dcdrw.console import domain, interrupted_status, interruptible, need
 from dcdrw.page.live_state import FRAMES_KEPT, Command, read_command
 from dcdrw.suite.executables import RECORDER, TRIAL
 from dcdrw.suite.parameter_file import TrialParams, add_rig_options, chosen_params, write_parameter_file
@@ -53,14 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
-    for module, mend in (
-        ('rclpy', "source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces"),
-        ('aiohttp', 'pip install aiohttp'),
-    ):
-        try:
-            import_module(module)
-        except ImportError:
-            raise ValueError(f'the live page needs {module}: {mend}') from None
+    need('the live page', 'rclpy', 'aiohttp')
     from dcdrw.page.live_page import PageServer, is_loopback, listen_at
     from dcdrw_msgs_py.node import SPIN_SECONDS
 
@@ -70,10 +61,8 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f'--token must have at least {SHORTEST_TOKEN} characters; {AUTO} makes one up')
     if not token and not is_loopback(options.host):
         raise ValueError(f'{options.host} is open to others: give a --token, or --token {AUTO}')
-    stopped: list[int] = []
     with ExitStack() as stack:
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            stack.callback(signal.signal, number, signal.signal(number, lambda number, _: stopped.append(number)))
+        stopped = stack.enter_context(interruptible())
         listener = stack.enter_context(listen_at(options.host, options.port))
         environment = _environment(options, stack)
         nodes = _start_nodes(params, options.namespace, environment, stack) if options.trial else []
@@ -83,6 +72,8 @@ def run(options: argparse.Namespace) -> int:
         stack.callback(server.close)
         executor = _listener(params, options.namespace, server, commands, bool(nodes), stack)
         address = _address(listener, token)
+        if stopped:  # before there was a page to end
+            return interrupted_status(stopped)
         if nodes:
             joining = ' '.join(f'{name}={value}' for name, value in environment.items())
             print(f'The nodes run; `export {joining}` joins them.')

@@ -1,17 +1,19 @@
 """`dcdrw models`: what the single wheel and the rigidly coupled pair do on a rig's slope."""
 
 import argparse
-import json
 import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from dcdrw.canvas import new_figure
+from dcdrw.console import add_json, check_json, tell, tell_where
+from dcdrw.drawings.figure_files import add_formats, figure_files, write_figure
+from dcdrw.files import add_force, refuse_existing, to_json, write_text
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelParams
 from dcdrw_sim.figures import model_figures
+from dcdrw_sim.figures.style import new_figure
 from dcdrw_sim.map.return_map import ReturnMap
 from dcdrw_sim.model.dynamics import gentlest_slope, limit_cycle_speed
 from dcdrw_sim.relatives import rigid_pair, rimless_wheel
@@ -21,6 +23,7 @@ from dcdrw_sim.relatives.rigid_pair import NEAR_TOGETHER, RigidPair
 PHASES = (0.0, NEAR_TOGETHER, 0.25, 0.5, 0.75)
 GAITS = (0.0, 0.25, 0.5, 0.75)
 BANDS = 3
+PICTURES = 'wheel', 'pair', 'footfalls'
 
 _EPILOG = """\
 The single wheel is McGeer's rimless wheel. The rigid pair has a bar as long as D0 in the coupler's place (Smith and
@@ -37,21 +40,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = _EPILOG
     add_rig_options(parser)
     parser.add_argument('--out', type=Path, metavar='DIR', help='draw the pictures and write models.json there, too')
+    add_formats(parser)
+    add_json(parser)
+    add_force(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     rig = chosen_params(options).rig.resolved()
+    check_json(options)
     if options.out:
         new_figure(1, 1)
-        options.out.mkdir(parents=True, exist_ok=True)
+        files = figure_files(options.out, PICTURES, options.formats)
+        refuse_existing([options.out / 'models.json', *files], options.force)
     found = record(rig)
-    print('\n'.join(report(found)))
+    tell(options, report(found), found)
     if options.out:
-        text = json.dumps(found, indent=1, ensure_ascii=False)
-        (options.out / 'models.json').write_text(text + '\n', encoding='utf-8')
-        draw(rig, found, options.out)
-        print(f'numbers and pictures are in {options.out}')
+        options.out.mkdir(parents=True, exist_ok=True)
+        write_text(options.out / 'models.json', to_json(found), options.force)
+        for name, figure in draw(rig, found).items():
+            write_figure(figure, options.out, name, options.formats, options.force)
+        tell_where(options, f'numbers and pictures are in {options.out}')
     return 0
 
 
@@ -210,35 +219,34 @@ def _pair_lines(pair: dict[str, Any]) -> Iterator[str]:
         yield f'  fastest at {100 * fastest["phase"]:.2f} %: {fastest["velocity"]:.4f} m/s'
 
 
-def draw(rig: RigParams, found: dict[str, Any], folder: Path) -> None:
-    """Draw the pictures.
+def draw(rig: RigParams, found: dict[str, Any]) -> dict[str, Any]:
+    """The pictures as matplotlib figures, by their names.
 
     Raises:
         ValueError: matplotlib is not installed.
 
     """
     wheels = {FRONT: rig.front} if rig.front == rig.rear else {FRONT: rig.front, REAR: rig.rear}
-    figure = new_figure(11, 5 * len(wheels))
+    drawn = {}
+    drawn['wheel'] = figure = new_figure(11, 5 * len(wheels))
     for (name, wheel), (basin, speed) in zip(
         wheels.items(), figure.subplots(len(wheels), 2, squeeze=False), strict=True
     ):
         model_figures.draw_basin(basin, wheel, rig.slope, rig.gravity)
         model_figures.draw_wheel_speed(speed, wheel, rig.slope, rig.gravity)
         speed.set_title('a single wheel' if len(wheels) == 1 else f'the {name} wheel by itself')
-    figure.savefig(folder / 'wheel.png', dpi=120)
     if 'fastest' in found['rigid_pair']:
-        figure = new_figure(11, 4.6)
+        drawn['pair'] = figure = new_figure(11, 4.6)
         speed, energy = figure.subplots(1, 2)
         coupled = found['coupled_pair']
         model_figures.draw_speed(speed, rig, (coupled['phase'], coupled['velocity']) if coupled.get('stable') else None)
         model_figures.draw_energy(energy, rig)
-        figure.savefig(folder / 'pair.png', dpi=120)
-    figure = new_figure(11, 6)
+    drawn['footfalls'] = figure = new_figure(11, 6)
     for axes, phase in zip(figure.subplots(2, 2, sharex=True, sharey=True).flat, GAITS, strict=True):
         model_figures.draw_hildebrand(axes, steady_contacts(phase, 2), title=f'p = {100 * phase:.0f} %')
         axes.set_xlim(0.0, 2.0)
         axes.label_outer()
-    figure.savefig(folder / 'footfalls.png', dpi=120)
+    return drawn
 
 
 def _known(value: float) -> float | None:

@@ -5,7 +5,7 @@ import os
 import sys
 from pathlib import Path
 
-from dcdrw.arguments import domain
+from dcdrw.console import LiveLine, domain, need
 from dcdrw.recordings.recorder import new_folder, require_libraries
 
 _EPILOG = """\
@@ -35,14 +35,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
-    try:
-        import rclpy
-        from rclpy.parameter import Parameter
-    except ImportError:
-        raise ValueError(
-            "a recording needs rclpy: source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' "
-            'ros-jazzy-common-interfaces'
-        ) from None
+    need('a recording', 'rclpy')
+    import rclpy
+    from rclpy.parameter import Parameter
+
     require_libraries()
     if options.domain is not None:
         os.environ['ROS_DOMAIN_ID'] = str(options.domain)
@@ -63,18 +59,12 @@ def run(options: argparse.Namespace) -> int:
     def show() -> None:
         if node and node.failure:
             rclpy.shutdown()
-        elif node and node.recorder and sys.stderr.isatty():
-            print(
-                f'\r\x1b[K{sum(node.recorder.counts.values())} messages, {node.recorder.size / 1e6:.1f} MB',
-                end='',
-                file=sys.stderr,
-                flush=True,
-            )
+        elif node and node.recorder:
+            line.show(f'{sum(node.recorder.counts.values())} messages, {node.recorder.size / 1e6:.1f} MB')
 
     namespace = ['-r', f'__ns:=/{options.namespace.strip("/")}'] if options.namespace else []
-    status = run_node('dcdrw record', make, ['--ros-args', *namespace])
-    if sys.stderr.isatty():
-        print(file=sys.stderr)
+    with LiveLine() as line:
+        status = run_node('dcdrw record', make, ['--ros-args', *namespace])
     if node and node.failure:
         print(f'dcdrw record: {node.failure}', file=sys.stderr)
         return 1

@@ -1,14 +1,14 @@
 """`dcdrw regimes`: whether a pair walks in step, what it takes, and how far it is from stalling."""
 
 import argparse
-import json
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from dcdrw.console import add_json, check_json, tell
+from dcdrw.files import add_force
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import RigParams
@@ -37,17 +37,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = 'Tell what it takes for a pair to walk in step, and whether it has it.'
     parser.epilog = _EPILOG
     add_rig_options(parser)
-    parser.add_argument('--json', type=Path, metavar='OUT.json', help='write everything here, too')
+    add_json(parser)
+    add_force(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
+    check_json(options)
     rig = chosen_params(options).rig.resolved()
     found = record(rig)
-    if options.json:
-        options.json.write_text(json.dumps(found, indent=1, ensure_ascii=False) + '\n', encoding='utf-8')
-    for heading, content in report(rig, found):
-        print(f'{heading:<12} {content}')
+    tell(options, (f'{heading:<12} {content}' for heading, content in report(rig, found)), found)
     return 0
 
 

@@ -2,10 +2,9 @@
 
 import argparse
 import math
-import sys
 from pathlib import Path
 
-from dcdrw.arguments import number, positive
+from dcdrw.console import LiveLine, need, number, positive
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw_msgs_py.topics import COUPLER, FRONT_WHEEL, JOINT_STATES, REAR_WHEEL
@@ -58,13 +57,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
-    try:
-        import rclpy
-    except ImportError:
-        raise ValueError(
-            "a replay needs rclpy: source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' "
-            'ros-jazzy-common-interfaces'
-        ) from None
+    need('a replay', 'rclpy')
+    import rclpy
+
     from dcdrw.nodes.replay_node import Part, ReplayNode
     from dcdrw_msgs_py.node import run as run_node
     from dcdrw_msgs_py.node import steady_clock
@@ -82,25 +77,18 @@ def run(options: argparse.Namespace) -> int:
             return node
 
         def show() -> None:
-            if node and sys.stderr.isatty():
-                at = (node.log_ns - recording.start_ns) / 1e9
-                print(
-                    f'\r\x1b[K{at:6.1f} s  {node.sent} joint states'
-                    if node.sent
-                    else '\r\x1b[Kwaiting for a listener of joint_states ...',
-                    end='',
-                    file=sys.stderr,
-                    flush=True,
-                )
+            if node and node.sent:
+                line.show(f'{(node.log_ns - recording.start_ns) / 1e9:6.1f} s  {node.sent} joint states')
+            elif node:
+                line.show('waiting for a listener of joint_states ...')
             if node and node.done:
                 rclpy.shutdown()
 
         namespace = ['-r', f'__ns:=/{options.namespace.strip("/")}'] if options.namespace else []
-        status = run_node('dcdrw replay', make, ['--ros-args', *namespace])
+        with LiveLine() as line:
+            status = run_node('dcdrw replay', make, ['--ros-args', *namespace])
         if node is None:
             return status
-        if sys.stderr.isatty():
-            print(file=sys.stderr)
         print(f'{node.sent} joint states sent')
         return 0 if node.done else 130
 

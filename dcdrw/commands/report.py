@@ -1,10 +1,10 @@
 """`dcdrw report`: a day of trials on one page, and every number as CSV."""
 
 import argparse
-import csv
 import sys
 from pathlib import Path
 
+from dcdrw.files import add_force, refuse_existing, write_csv, write_text
 from dcdrw.trials.day import STEP_COLUMNS, TRIAL_COLUMNS, RecordedTrial, new_name, open_trial, step_rows, table
 from dcdrw.trials.report_page import page
 from dcdrw.trials.results import SAMPLES_HEADER
@@ -27,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = _EPILOG
     parser.add_argument('recordings', type=Path, nargs='+', metavar='RECORDING')
     parser.add_argument('--out', type=Path, required=True, metavar='REPORT.html', help='the page to write')
+    add_force(parser)
     parser.add_argument('--title', default='Trials', metavar='TEXT', help='its heading (default: %(default)s)')
     parser.add_argument(
         '--rig',
@@ -45,9 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     tables = options.out.with_suffix('.csv')
-    for path in (options.out, tables):
-        if path.exists():
-            raise ValueError(f'{path} exists already, not overwriting; choose another --out')
+    refuse_existing((options.out, tables), options.force)
     trials: list[RecordedTrial] = []
     for path in options.recordings:
         try:
@@ -64,17 +63,17 @@ def run(options: argparse.Namespace) -> int:
         'steps.csv': table(STEP_COLUMNS, (row for trial in trials for row in step_rows(trial))),
     }
     text = page(options.title, trials, small)
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    tables.mkdir()
+    tables.mkdir(parents=True, exist_ok=True)
     for name, content in small.items():
-        (tables / name).write_text(content, encoding='utf-8')
-    with (tables / 'samples.csv').open('w', encoding='utf-8', newline='') as file:
-        writer = csv.writer(file)
-        writer.writerow(('trial', *SAMPLES_HEADER, 'error_percent'))
-        for trial in trials:
-            columns = [getattr(trial.analysis.motion, name).tolist() for name in (*SAMPLES_HEADER, 'error_percent')]
-            writer.writerows((trial.name, *row) for row in zip(*columns, strict=True))
-    options.out.write_text(text, encoding='utf-8')
+        write_text(tables / name, content, options.force)
+    columns = (*SAMPLES_HEADER, 'error_percent')
+    samples = (
+        (trial.name, *row)
+        for trial in trials
+        for row in zip(*(getattr(trial.analysis.motion, name).tolist() for name in columns), strict=True)
+    )
+    write_csv(tables / 'samples.csv', ('trial', *columns), samples, options.force)
+    write_text(options.out, text, options.force)
     print(f'Written: {options.out} and {tables}/')
     whole = len(trials) == len(options.recordings) and not any(trial.analysis.damage for trial in trials)
     return 0 if whole else 1

@@ -1,13 +1,12 @@
 """`dcdrw map`: how fast a pair falls into step, by the return map's multipliers, by regression and by counting."""
 
 import argparse
-import json
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
-from dcdrw.arguments import count
+from dcdrw.console import add_json, check_json, count, tell
+from dcdrw.files import add_force
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_sim.map.regression import BAND, PHASES, STEPS, Convergence, Regression, measure
@@ -33,18 +32,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='N',
         help=f'steps of each of the {len(PHASES)} trials (default: %(default)s)',
     )
-    parser.add_argument('--json', type=Path, metavar='OUT.json', help='write everything here, too')
+    add_json(parser)
+    add_force(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
+    check_json(options)
     return_map = ReturnMap(chosen_params(options).rig)
     convergence = measure(return_map, steps=options.steps)
-    if options.json:
-        text = json.dumps(record(return_map, convergence), indent=1, ensure_ascii=False)
-        options.json.write_text(text + '\n', encoding='utf-8')
-    for name, content in report(return_map, convergence):
-        print(f'{name:<13} {content}')
+    lines = (f'{name:<13} {content}' for name, content in report(return_map, convergence))
+    tell(options, lines, record(return_map, convergence))
     return 0
 
 

@@ -1,14 +1,13 @@
 """`dcdrw simulate`: cases in, strikes and motion out."""
 
 import argparse
-import csv
-import json
 import sys
 from pathlib import Path
 
 import numpy as np
 
-from dcdrw.arguments import count, positive
+from dcdrw.console import count, positive
+from dcdrw.files import add_force, refuse_existing, to_json, write_csv, write_text, write_whole
 from dcdrw_sim.motion.cases import DEFAULT_STRIKES, Case, read_cases, run_record
 from dcdrw_sim.motion.trajectory import Run, Trajectory
 from dcdrw_sim.motion.trajectory import run as integrate
@@ -42,6 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='N',
         help=f'strikes per case (default: as many as the case lists, else {DEFAULT_STRIKES})',
     )
+    add_force(parser)
     parser.add_argument('--trajectory', type=Path, metavar='OUT.csv|OUT.npz', help='write the motion here')
     parser.add_argument(
         '--rate',
@@ -57,23 +57,25 @@ def run(options: argparse.Namespace) -> int:
     cases, is_list = read_cases(options.cases)
     if options.trajectory and options.trajectory.suffix not in _WRITERS:
         raise ValueError(f'--trajectory must end in {" or ".join(_WRITERS)}, got {options.trajectory}')
+    refuse_existing(filter(None, (options.strikes, options.trajectory)), options.force)
     runs = []
     for case in cases:
         result = integrate(case.rig, case.state, strikes=options.count or case.listed_strikes)
         runs.append(result)
         print(f'{case.name}: {len(result.strikes)} strikes in {result.duration:.6g}; {result.reason}', file=sys.stderr)
     records = [run_record(case, result) for case, result in zip(cases, runs, strict=True)]
-    text = json.dumps(records if is_list else records[0], indent=1)
+    text = to_json(records if is_list else records[0])
     if options.strikes:
-        options.strikes.write_text(text + '\n', encoding='utf-8')
+        write_text(options.strikes, text, options.force)
     elif not options.trajectory:
-        print(text)
+        print(text, end='')
     if options.trajectory:
         samples = sum(result.duration for result in runs) * options.rate
         if samples > MOST_SAMPLES:
             raise ValueError(f'--rate {options.rate:g} makes {samples:.3g} samples; {MOST_SAMPLES:.0e} are the limit')
         motions = [(name, _sample(result, options.rate)) for name, result in zip(_labels(cases), runs, strict=True)]
-        _WRITERS[options.trajectory.suffix](options.trajectory, motions)
+        with write_whole(options.trajectory, options.force) as unfinished:
+            _WRITERS[options.trajectory.suffix](unfinished, motions)
     return 0
 
 
@@ -88,11 +90,8 @@ def _sample(result: Run, rate: float) -> Trajectory:
 
 
 def _write_csv(path: Path, motions: list[tuple[str, Trajectory]]) -> None:
-    with path.open('w', encoding='utf-8', newline='') as file:
-        writer = csv.writer(file)
-        writer.writerow(('case', *Trajectory._fields))
-        for name, motion in motions:
-            writer.writerows((name, *map(float, row)) for row in zip(*motion, strict=True))
+    rows = ((name, *map(float, row)) for name, motion in motions for row in zip(*motion, strict=True))
+    write_csv(path, ('case', *Trajectory._fields), rows, force=True)
 
 
 def _write_npz(path: Path, motions: list[tuple[str, Trajectory]]) -> None:

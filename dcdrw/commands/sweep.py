@@ -2,20 +2,17 @@
 
 import argparse
 import math
-import os
-import signal
 from collections.abc import Iterator
 from concurrent.futures import CancelledError, Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
-from dcdrw.arguments import count, positive
+from dcdrw.console import Bar, cores, count, positive
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params
 from dcdrw_sim.map.regression import PHASES
 from dcdrw_sim.study.sweep import Axis, Sweep, default_axis, default_seconds
 from dcdrw_sim.study.sweep_dataset import open_sweep, require_extra
-from dcdrw_sim.study.sweep_run import Progress, run_sweep
+from dcdrw_sim.study.sweep_run import run_sweep
 from dcdrw_sim.study.verdict import BAND, Verdict
 
 CONNECT_SECONDS = 10.0
@@ -81,10 +78,10 @@ def axis(text: str) -> Axis:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
-    require_extra('xarray', 'netCDF4', 'dask.array', 'tqdm')
+    require_extra('xarray', 'netCDF4', 'dask.array')
     sweep = chosen_sweep(options)
-    with _ended_by_signals(), _executor(options) as (executor, at_once), Bar() as bar:
-        run_sweep(sweep, options.out, executor, at_once, bar)
+    with _executor(options) as (executor, at_once), Bar('judging', 'points') as bar:
+        run_sweep(sweep, options.out, executor, at_once, lambda progress: bar.reach(*progress))
     print(f'{options.out}: {summary(options.out)}')
     return 0
 
@@ -119,17 +116,12 @@ def _executor(options: argparse.Namespace) -> Iterator[tuple[Executor, int]]:
         with _cluster(options.scheduler) as found:
             yield found
         return
-    cores = options.workers or _cores()
-    executor = ThreadPoolExecutor(cores)
+    workers = options.workers or cores()
+    executor = ThreadPoolExecutor(workers)
     try:
-        yield executor, cores + 1
+        yield executor, workers + 1
     finally:
         executor.shutdown(cancel_futures=True)
-
-
-def _cores() -> int:
-    """Those that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count() or 1
 
 
 @contextmanager
@@ -153,44 +145,3 @@ def _cluster(address: str) -> Iterator[tuple[Executor, int]]:
             raise OSError(
                 f'the Dask cluster at {address} failed: {error}; the same command goes on from here'
             ) from None
-
-
-class Bar:
-    """A progress bar with the rate, on a terminal only."""
-
-    def __init__(self, name: str | None = None) -> None:
-        self._name = name
-
-    def __enter__(self) -> 'Bar':
-        from tqdm import tqdm
-
-        self._make: Any = tqdm
-        self._bar: Any = None
-        return self
-
-    def __call__(self, progress: Progress) -> None:
-        """Show how far it is; what earlier runs did does not count for the rate."""
-        if self._bar is None:
-            self._bar = self._make(
-                desc=self._name, total=progress.total, initial=progress.points, unit=' points', disable=None
-            )
-        self._bar.update(progress.points - self._bar.n)
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.close()
-
-
-@contextmanager
-def _ended_by_signals() -> Iterator[None]:
-    """SIGTERM and SIGHUP end as Ctrl-C does."""
-
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    before = {number: signal.signal(number, interrupt) for number in (signal.SIGTERM, signal.SIGHUP)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

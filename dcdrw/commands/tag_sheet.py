@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dcdrw.console import need
+from dcdrw.files import add_force, refuse_existing, write_whole
 from dcdrw.suite.parameter_file import read_parameter_file
 from dcdrw_msgs_py.opencv import tag_cells
 from dcdrw_msgs_py.quantity import check
@@ -36,7 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'Write the AprilTags of a rig to a PDF: true to scale, with a ruler to check it, cut lines and '
         'instructions for mounting.'
     )
-    parser.add_argument('--out', type=Path, required=True, metavar='FILE.pdf', help='the sheet; must not exist')
+    parser.add_argument('--out', type=Path, required=True, metavar='FILE.pdf', help='the sheet')
+    add_force(parser)
     parser.add_argument(
         '--rig',
         type=Path,
@@ -51,14 +54,18 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     if options.out.suffix != '.pdf':
         raise ValueError(f'--out must end in .pdf, got {options.out}')
-    if options.out.exists():
-        raise ValueError(f'{options.out} exists already, not overwriting; choose another --out')
+    refuse_existing([options.out], options.force)
     params = read_parameter_file(options.rig, SheetParams()) if options.rig else SheetParams()
     pages = draw_pages(params.tags, options.paper)
     from matplotlib import rc_context
     from matplotlib.backends.backend_pdf import PdfPages
 
-    with rc_context({'pdf.fonttype': 42}), PdfPages(options.out, metadata={'Title': 'AprilTags of a dcdrw rig'}) as pdf:
+    title = {'Title': 'AprilTags of a dcdrw rig'}
+    with (
+        rc_context({'pdf.fonttype': 42}),
+        write_whole(options.out, options.force) as unfinished,
+        PdfPages(unfinished, metadata=title) as pdf,
+    ):
         for page in pages:
             pdf.savefig(page)
     print(
@@ -79,10 +86,9 @@ def draw_pages(tags: TagParams, paper: str) -> list[Any]:
         ValueError: matplotlib or OpenCV is missing, or a tag is impossible or larger than the paper.
 
     """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise ValueError('a tag sheet needs matplotlib: pip install matplotlib') from None
+    need('a tag sheet', 'matplotlib')
+    from matplotlib.figure import Figure
+
     width, height = PAPERS[paper]
     all_mounts = mounts(check(tags))
     boards = [_board(mount, tags.family) for mount in all_mounts]

@@ -1,56 +1,23 @@
 """`dcdrw track`: a video of the rig in; the same results as a live trial's out, faster than it was filmed."""
 
 import argparse
-import csv
-import math
 import sys
-from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from itertools import groupby
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
-
-from dcdrw.arguments import number, positive
-from dcdrw.commands.film import Files, open_video
-from dcdrw.commands.trial import free_folder
-from dcdrw.progress import Progress, interruptible
+from dcdrw.console import Interrupted, interrupted_status
+from dcdrw.files import add_force, free_folder, refuse_existing
 from dcdrw.recordings.bag_folder import RECORDING
-from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.joint_recording import record_joints
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw.trials.analysis import Analysis, analyze
+from dcdrw.trials.filmed import Film, add_film_arguments, debug_video, joint_batches, quality, write_frames
 from dcdrw.trials.results import write_results
 from dcdrw.trials.summary import sentence
-from dcdrw_msgs_py.camera import Camera, read_camera
-from dcdrw_msgs_py.frame import Frame
-from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.rig import FRONT, REAR
-from dcdrw_msgs_py.samples import RUN, SECOND, JointSample
-from dcdrw_msgs_py.tagging import TagParams
-from dcdrw_tracker.gait.phase import PhaseParams
-from dcdrw_tracker.node.debug_image import draw
-from dcdrw_tracker.node.tag_tracker import TagTracker, Tracked
-from dcdrw_tracker.node.tracker_source import SourceParams
-from dcdrw_tracker.node.video import VideoFile
-from dcdrw_tracker.tags.wheel_view import PairViewParams, WheelView
-from dcdrw_tracker.wheels.wheel_track import TrackParams
-
-AHEAD = 4
-"""Frames that are decoded while others are tracked."""
-FRAMES = (
-    'stamp_ns',
-    'run',
-    'psi1',
-    'omega1',
-    'psi2',
-    'omega2',
-    *(f'{name}{wheel}' for wheel in (1, 2) for name in ('tags', 'error_px', 'x', 'y')),
-)
-"""Of frames.csv."""
+from dcdrw_tracker.node.tag_tracker import Tracked
 
 _EPILOG = """\
 RIG.yaml is a ROS 2 parameter file, the same that tag_tracker reads: the wheels, the tags on them, slope, and how the
@@ -64,15 +31,6 @@ footfalls.csv and a recording (for ros2 bag, dcdrw replay, analyze and report), 
 Ctrl-C ends the tracking and keeps what was tracked. Exit status: 0 all was tracked, 1 the video is truncated (what
 came before is kept), 2 wrong input, 130 interrupted.
 """
-
-
-class TrackingParams(NamedTuple):
-    """The parameters of tag_tracker, as far as a video concerns them."""
-
-    tags: TagParams = TagParams()
-    view: PairViewParams = PairViewParams()
-    track: TrackParams = TrackParams()
-    source: SourceParams = SourceParams()
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -90,45 +48,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--debug',
         type=Path,
         metavar='FILE.mp4',
-        help='make a video with tags, hubs, spokes and stance legs drawn in; must not exist',
+        help='make a video with tags, hubs, spokes and stance legs drawn in',
     )
-
-
-def add_film_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments that choose a `Film`."""
-    parser.add_argument('video', type=Path, metavar='VIDEO')
-    parser.add_argument(
-        '--camera',
-        type=Path,
-        required=True,
-        metavar='CAMERA.yaml',
-        help='camera_info file of the camera that filmed, as camera_calibration writes it',
-    )
-    parser.add_argument('--rig', type=Path, metavar='RIG.yaml', help='what differs from the defaults')
-    parser.add_argument(
-        '--stamps',
-        type=Path,
-        metavar='FILE.csv',
-        help='a line with the time stamp in ns for each frame, after a heading',
-    )
-    parser.add_argument('--frame-rate', type=positive, metavar='HZ', help='of the camera, in the place of time stamps')
-    parser.add_argument(
-        '--from',
-        dest='start',
-        type=number,
-        default=0.0,
-        metavar='SECONDS',
-        help='of the video, from which on it counts (default: %(default)g)',
-    )
-    parser.add_argument(
-        '--to',
-        dest='end',
-        type=number,
-        default=math.inf,
-        metavar='SECONDS',
-        help='of the video, up to which it counts (default: its end)',
-    )
-    parser.add_argument('--quiet', action='store_true', help='no live progress')
+    add_force(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -138,20 +60,21 @@ def run(options: argparse.Namespace) -> int:
     if options.rig:
         trial_params = read_parameter_file(options.rig, trial_params)
     folder = free_folder(options.out)
+    refuse_existing([options.debug] if options.debug else [], options.force)
     with ExitStack() as stack:
-        debug = _DebugVideo(options.debug, film, stack) if options.debug else None
+        debug = stack.enter_context(debug_video(options.debug, film, options.force)) if options.debug else None
         frames: list[Tracked] = []
         for frame, tracked in film.track():
             frames.append(tracked)
             if debug:
-                debug.write(frame, tracked)
+                debug(frame, tracked)
     samples = [tracked.sample for tracked in frames if tracked.sample]
     if film.interrupted and not samples:
-        raise KeyboardInterrupt
+        raise Interrupted(film.interrupted[0])
     film.check()
     trial = analyze(joint_batches(samples, trial_params.phase), trial_params)
     folder.mkdir(parents=True, exist_ok=True)
-    _write_frames(frames, folder / 'frames.csv')
+    write_frames(frames, folder / 'frames.csv')
     try:
         rig, _, phase, sync = trial_params
         record_joints(
@@ -160,208 +83,6 @@ def run(options: argparse.Namespace) -> int:
     except ValueError as error:
         print(f'dcdrw track: {error}', file=sys.stderr)
     return _finish(film, frames, trial, folder)
-
-
-class Film:
-    """A video, the camera that filmed it, and the tracker that is to follow the wheels in it.
-
-    Raises:
-        ValueError: OpenCV is missing, or an argument, or what is in a file, is impossible.
-        OSError: a file cannot be read.
-
-    """
-
-    def __init__(self, options: argparse.Namespace) -> None:
-        opencv()
-        self.camera: Camera = read_camera(options.camera)
-        self.params = TrackingParams()
-        if options.rig:
-            self.params = read_parameter_file(options.rig, self.params)
-        tags, view, track, source = self.params
-        if not 0.0 <= options.start < options.end:
-            raise ValueError(f'--from must be ≥ 0 s and less than --to, got {options.start:g} and {options.end:g}')
-        self._span = options.start, options.end
-        self._quiet = options.quiet
-        self._stamps = self._read_stamps(options)
-        rate = options.frame_rate or (1.0 if self._stamps else source.frame_rate)  # stamps take the place of a rate
-        self.path: Path = options.video
-        self.video = VideoFile(self.path, rate)
-        self.tracker = TagTracker(tags, view, track, source.detector)
-        self.tracker.look_through(self.camera)
-        self.interrupted = False
-        self.complaint = ''
-        """What is wrong with the video, once it has been tracked to its end."""
-
-    def track(self) -> Iterator[tuple[Frame, Tracked]]:
-        """Every frame with what it brought; Ctrl-C ends it early.
-
-        Raises:
-            ValueError: the frames are not of the camera's size, or nothing tells when they were taken.
-
-        """
-        progress = Progress(self.video.count, self._quiet)
-        first_ns: int | None = None
-        try:
-            with interruptible() as interrupted:
-                for frame in _read_ahead(self._frames()):
-                    first_ns = frame.stamp_ns if first_ns is None else first_ns
-                    start, end = (first_ns + seconds * SECOND for seconds in self._span)
-                    if frame.stamp_ns > end or interrupted:
-                        break
-                    progress.show(self.video.read)
-                    if frame.stamp_ns >= start:
-                        yield frame, self._process(frame)
-                else:
-                    self.complaint = self.video.complaint
-                self.interrupted = bool(interrupted)
-        finally:
-            progress.end()
-
-    def check(self) -> None:
-        """Refuse a film that did not show both wheels.
-
-        Raises:
-            ValueError: it did not; what was looked for is told.
-
-        """
-        status, tags = self.tracker.status(), self.params.tags
-        if not status.angles.views:
-            raise ValueError(self.complaint or f'{self.path}: there is no frame between --from and --to')
-        frames = f'{self.path}: in {status.angles.views} frames'
-        looked = f'of family {tags.family} (family, front.ids and rear.ids in --rig)'
-        if not (status.front.frames or status.rear.frames):
-            front, rear = (', '.join(map(str, ids)) for ids in status.ids)
-            raise ValueError(f'{frames} no tag was seen; looked for {front} (front) and {rear} (rear) {looked}')
-        for wheel, quality, ids in zip((FRONT, REAR), (status.front, status.rear), status.ids, strict=True):
-            if not quality.frames:
-                raise ValueError(
-                    f'{frames} the {wheel} wheel was never seen; looked for tag {", ".join(map(str, ids))} {looked}'
-                )
-        if not status.angles.samples:
-            raise ValueError(f'{frames} the wheels were never tracked together')
-
-    def _process(self, frame: Frame) -> Tracked:
-        try:
-            return self.tracker.process(frame)
-        except ValueError as error:
-            raise ValueError(f'{self.path}: {error}') from None
-
-    def _frames(self) -> Iterator[Frame]:
-        for index, frame in enumerate(self.video.frames()):
-            if not self._stamps:
-                yield frame
-            elif index < len(self._stamps):
-                yield frame._replace(stamp_ns=self._stamps[index])
-            else:
-                raise ValueError(f'{self.path} has more frames than there are time stamps: {len(self._stamps)}')
-
-    def _read_stamps(self, options: argparse.Namespace) -> list[int]:
-        beside = Files.of(options.video).stamps
-        path = options.stamps or (beside if beside.exists() and not options.frame_rate else None)
-        if path is None:
-            return []
-        try:
-            stamps = [int(line.split(',')[0]) for line in path.read_text(encoding='utf-8').split()[1:]]
-        except ValueError as error:
-            raise ValueError(f'{path} must have a heading, then a time stamp in ns a line: {error}') from None
-        if not stamps or min(np.diff(stamps), default=1) <= 0:
-            raise ValueError(f'{path}: the time stamps must grow from line to line')
-        return stamps
-
-
-def _read_ahead(frames: Iterator[Frame]) -> Iterator[Frame]:
-    """The same frames, decoded in a thread while others are worked on: OpenCV leaves Python alone meanwhile."""
-    with ThreadPoolExecutor(1) as decoder:
-        pending = deque(decoder.submit(next, frames, None) for _ in range(AHEAD))
-        while (frame := pending.popleft().result()) is not None:
-            pending.append(decoder.submit(next, frames, None))
-            yield frame
-
-
-def joint_batches(samples: Iterable[JointSample], names: PhaseParams) -> Iterator[JointBatch]:
-    """Samples as the joint states that a tag tracker publishes."""
-    for run, group in groupby(samples, lambda sample: sample.run):
-        part = list(group)
-        turns = np.array([(sample.front, sample.rear) for sample in part])
-        yield JointBatch(
-            f'{RUN}{run}',
-            (names.front_joint, names.rear_joint),
-            np.array([sample.stamp_ns for sample in part], np.int64),
-            turns[:, :, 0],
-            turns[:, :, 1],
-            np.full(turns.shape[:2], math.nan),
-        )
-
-
-class _DebugVideo:
-    """Writes the frames with what was made of them drawn in."""
-
-    def __init__(self, path: Path, film: Film, stack: ExitStack) -> None:
-        if path.exists():
-            raise ValueError(f'{path} exists already, not overwriting; choose another --debug')
-        self._film = film
-        self._writer = open_video(path, film.video.own_rate or 30.0, (film.camera.width, film.camera.height), True)
-        stack.callback(self._writer.release)
-
-    def write(self, frame: Frame, tracked: Tracked) -> None:
-        film = self._film
-        self._writer.write(
-            draw(
-                frame.image,
-                tracked,
-                film.tracker.mounts,
-                film.camera,
-                (film.params.track.front, film.params.track.rear),
-            )
-        )
-
-
-def _write_frames(frames: Sequence[Tracked], path: Path) -> None:
-    with path.open('w', encoding='utf-8', newline='') as file:
-        writer = csv.writer(file)
-        writer.writerow(FRAMES)
-        for tracked in frames:
-            sample, view = tracked.sample, tracked.view
-            turns = (sample.run, *sample.front, *sample.rear) if sample else [''] * 5
-            writer.writerow((view.stamp_ns, *turns, *_columns(view.front), *_columns(view.rear)))
-
-
-def _columns(view: WheelView | None) -> tuple[Any, ...]:
-    return (view.tags, view.error_px, *view.hub) if view else (0, '', '', '')
-
-
-def quality(film: Film, frames: Sequence[Tracked]) -> dict[str, Any]:
-    """How well the wheels were tracked, for a program."""
-    status = film.tracker.status()
-    angles = status.angles
-
-    def wheel(name: str) -> dict[str, Any]:
-        views = [view for tracked in frames if (view := getattr(tracked.view, name))]
-        track = getattr(angles, name)
-        return {
-            'frames': len(views),
-            'reprojection_error_px': round(math.sqrt(np.mean([view.error_px**2 for view in views])), 4),
-            'tag_size_px': round(float(np.mean([view.size_px for view in views])), 1),
-            'tags_per_frame': round(float(np.mean([view.tags for view in views])), 2),
-            'outliers': track.outliers,
-            'waited_for_others': track.unconfirmed,
-            'occlusions_of_more_than_a_step_restored': track.restored,
-            'hub_travels_as_it_rolls': track.travels,
-        }
-
-    return {
-        'frames': angles.views,
-        'frames_with_both_wheels': angles.samples,
-        'frame_rate_hz': round(angles.cadence.rate, 3) if math.isfinite(angles.cadence.rate) else None,
-        'frames_missing': angles.cadence.lost,
-        'longest_gap_s': round(angles.cadence.longest, 6),
-        'frames_out_of_order': angles.out_of_order,
-        'frames_with_duplicate_tags': status.duplicates,
-        'tags_refused': status.refused_tags,
-        'times_the_turns_were_lost': angles.lost,
-        FRONT: wheel(FRONT),
-        REAR: wheel(REAR),
-    }
 
 
 def _finish(film: Film, frames: Sequence[Tracked], trial: Analysis, folder: Path) -> int:
@@ -381,13 +102,13 @@ def _finish(film: Film, frames: Sequence[Tracked], trial: Analysis, folder: Path
         print(f'dcdrw track: {line}', file=sys.stderr)
     end = 'interrupted' if film.interrupted else film.complaint or 'complete'
     try:
-        write_results(trial, folder, end=end, video=str(film.path), tracking=told)
+        write_results(trial, folder, {'end': end, 'video': str(film.path), 'tracking': told})
     except ValueError as error:
         print(f'dcdrw track: no picture: {error}', file=sys.stderr)
     print(f'Written: {folder}/')
     if film.complaint:
         print(f'dcdrw track: {film.complaint}; what came before is kept', file=sys.stderr)
-    return 130 if film.interrupted else 1 if film.complaint else 0
+    return interrupted_status(film.interrupted) if film.interrupted else 1 if film.complaint else 0
 
 
 def _warnings(told: dict[str, Any]) -> Iterator[str]:

@@ -4,14 +4,15 @@ With `--camera`, virtual camera and tag tracker stand between the simulator and 
 """
 
 import argparse
+import math
 import sys
 import time
 from contextlib import nullcontext
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dcdrw.arguments import domain, number, positive
+from dcdrw.console import LiveLine, domain, interrupted_status, need, phase_percent, positive
+from dcdrw.files import free_folder
 from dcdrw.recordings.recorder import require_libraries
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params
 from dcdrw.suite.processes import free_domain
@@ -46,7 +47,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = _EPILOG
     add_rig_options(parser)
     parser.add_argument(
-        '--initial-phase', type=number, metavar='PERCENT', help='phase at the start, percent of a step (default: 21.6)'
+        '--initial-phase',
+        type=phase_percent,
+        metavar='PERCENT',
+        help='phase at the start, percent of a step (default: 21.6)',
     )
     parser.add_argument('--seconds', type=positive, default=30.0, help='length of the trial (default: %(default)g)')
     parser.add_argument(
@@ -67,13 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
-    try:
-        import rclpy  # noqa: F401
-    except ImportError:
-        raise ValueError(
-            "a trial needs rclpy: source a ROS 2, or pip install 'ros-jazzy-rclpy[fastrtps]' "
-            'ros-jazzy-common-interfaces'
-        ) from None
+    need('a trial', 'rclpy')
     require_libraries()
     if options.camera:
         opencv()
@@ -98,63 +96,52 @@ def run(options: argparse.Namespace) -> int:
     filmed = filmed_rig(options, params) if options.camera else None
     folder = free_folder(options.out)
     folder.mkdir(parents=True, exist_ok=True)
-    screen = _Screen(options.quiet)
-    with nullcontext(options.domain) if options.domain is not None else free_domain() as chosen:
+    with (
+        _Screen(options.quiet) as screen,
+        nullcontext(options.domain) if options.domain is not None else free_domain() as chosen,
+    ):
         environment = {'ROS_DOMAIN_ID': str(chosen)}
         if options.domain is None:
             environment |= {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
         course = SimulatedTrial(
-            params, filmed, folder, environment, options.seconds, options.note, screen.say, screen.show
+            params, filmed, folder, environment, options.seconds, options.note, screen.say, screen.watch
         ).run()
-    screen.end()
     return _finish(course, folder)
 
 
-def free_folder(chosen: Path | None) -> Path:
-    """The folder for what a trial brings, by default one for this second; nothing is made yet.
-
-    Raises:
-        ValueError: it holds something already.
-
-    """
-    folder = chosen or Path('trials') / datetime.now().strftime('%Y%m%d-%H%M%S')
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise ValueError(f'{folder} exists already, not overwriting; choose another --out')
-    return folder
+_STYLES = {
+    PairState.SYNCHRONIZED: 'green',
+    PairState.STALLED: 'red',
+    PairState.SLIPPED: 'red',
+    PairState.LOST: 'red',
+}
 
 
-class _Screen:
-    """The live line of a trial; on a terminal it is written over."""
+class _Screen(LiveLine):
+    """The live line of a trial; where there is no terminal, a line each second."""
 
     def __init__(self, quiet: bool) -> None:
-        self._quiet, self._terminal = quiet, sys.stdout.isatty()
-        self._shown_at = 0.0
+        super().__init__(quiet)
+        self._print = not (quiet or self.on)
+        self._printed = -math.inf
 
-    def say(self, text: str) -> None:
+    def say(self, text: str, style: str = '') -> None:
         """Show a line."""
-        if self._quiet:
-            return
-        if self._terminal:
-            print(f'\r\x1b[K{text}', end='', flush=True)
-        else:
+        self.show(text, style)
+        if self._print and time.monotonic() - self._printed >= 1.0:
+            self._printed = time.monotonic()
             print(text, flush=True)
 
-    def show(self, observer: 'Observer') -> None:
-        """Show what the pair does, as often as a person wants to see it."""
-        if time.monotonic() - self._shown_at < (0.1 if self._terminal else 1.0):
-            return
-        self._shown_at = time.monotonic()
+    def watch(self, observer: 'Observer') -> None:
+        """Show what the pair does."""
         status, strikes = observer.monitor.status(), observer.strikes
+        state = observer.state or PairState.NO_DATA
         self.say(
             f'{observer.seconds:5.1f} s  phase {phase_text(status.phase)}  '
             f'error {status.error_percent:+5.1f} %  n {status.step_difference:+d}  '
-            f'strikes {strikes[FRONT]} + {strikes[REAR]}  {(observer.state or PairState.NO_DATA).word}'
+            f'strikes {strikes[FRONT]} + {strikes[REAR]}  {state.word}',
+            _STYLES.get(state, ''),
         )
-
-    def end(self) -> None:
-        """Leave the line."""
-        if not self._quiet and self._terminal:
-            print()
 
 
 def _finish(course: Course, folder: Path) -> int:
@@ -167,10 +154,12 @@ def _finish(course: Course, folder: Path) -> int:
         write_results(
             trial,
             folder,
-            end=course.end,
-            agreement=describe(course.agreements),
-            diagnostics=course.diagnoses,
-            **({'truth': truth._asdict()} if truth else {}),
+            {
+                'end': course.end,
+                'agreement': describe(course.agreements),
+                'diagnostics': course.diagnoses,
+                **({'truth': truth._asdict()} if truth else {}),
+            },
         )
         print(f'Written: {folder}/')
     except ValueError as error:
@@ -179,4 +168,4 @@ def _finish(course: Course, folder: Path) -> int:
         failure = failure or f'{error.strerror}: {folder}'
     if failure:
         print(f'dcdrw trial: {failure}', file=sys.stderr)
-    return 130 if course.interrupted else 1 if failure else 0
+    return interrupted_status(course.interrupted) if course.interrupted else 1 if failure else 0

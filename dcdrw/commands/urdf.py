@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from dcdrw.drawings.rig_markers import MarkerParams
+from dcdrw.files import add_force, write_text
 from dcdrw.suite.parameter_file import TrialParams, add_rig_options, chosen_params
 from dcdrw_msgs_py.rig import FRONT, REAR, WheelParams
 
@@ -27,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = _EPILOG
     add_rig_options(parser)
     parser.add_argument('--out', type=Path, metavar='FILE.urdf', help='where to write (default: print)')
+    add_force(parser)
     parser.add_argument(
         '--fixed-coupler',
         action='store_true',
@@ -38,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     text = make_urdf(chosen_params(options), options.fixed_coupler)
     if options.out:
-        options.out.write_text(text, encoding='utf-8')
+        write_text(options.out, text, options.force)
     else:
         print(text, end='')
     return 0

@@ -1,21 +1,19 @@
 """The card of a design: one page to keep beside the rig."""
 
 import math
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
+from dcdrw_sim.figures.style import BAND, BLUE, PINK, VERMILION, new_figure
 from dcdrw_sim.study.design import GRID, Assessment, Scores, Task
 from dcdrw_sim.study.verdict import Verdict
 
-if TYPE_CHECKING:
-    from dcdrw.commands.design import Part
-
 A4 = 8.27, 11.69
 """[inch]"""
-# Okabe and Ito's palette, in the order of the couplers.
-COLOURS = '#D55E00', '#0072B2', '#CC79A7'
+COLOURS = VERMILION, BLUE, PINK
+"""In the order of the couplers."""
 MARKERS = '*', 'o', 'D'
 LONGEST = 60
 """Steps that the page shows."""
@@ -27,10 +25,9 @@ def draw_card(
     task: Task,
     grid: Scores,
     chosen: dict[str, Assessment],
-    parts: 'list[Part]',
-    path: Path,
-) -> None:
-    """Draw the card into a PDF or PNG file, by the ending of its name.
+    on_sale: Mapping[str, Sequence[float]],
+) -> Any:
+    """The card as a matplotlib figure.
 
     Args:
         title: what it is for.
@@ -38,28 +35,21 @@ def draw_card(
         task: what they were judged by.
         grid: the couplers of the first look.
         chosen: what was found, by name.
-        parts: those on sale; may be none.
-        path: the file to write.
+        on_sale: stiffnesses of springs and dampings of dashpots on sale; may be none.
 
     Raises:
         ValueError: matplotlib is not installed.
 
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-        from matplotlib.layout_engine import ConstrainedLayoutEngine
-    except ImportError:
-        raise ValueError('a card needs matplotlib: pip install matplotlib') from None
-    figure = Figure(figsize=A4, layout=ConstrainedLayoutEngine(w_pad=0.15, h_pad=0.12, rect=(0.03, 0.02, 0.94, 0.95)))
-    FigureCanvasAgg(figure)
+    figure = new_figure(*A4, 'a card')
+    figure.get_layout_engine().set(w_pad=0.15, h_pad=0.12, rect=(0.03, 0.02, 0.94, 0.95))
     figure.suptitle(title, fontsize=13, fontweight='bold')
     words, top, middle, bottom = figure.subplots(4, 1, height_ratios=(1.4 * len(lines), 3.4, 2.6, 1.9))
     _write(words, lines)
-    _draw_map(top, grid, chosen, parts)
+    _draw_map(top, grid, chosen, on_sale)
     _draw_paths(middle, task, chosen)
     _draw_sensitivity(bottom, chosen)
-    figure.savefig(path, dpi=120)
+    return figure
 
 
 def _write(axes: Any, lines: dict[str, str]) -> None:
@@ -77,7 +67,7 @@ def _write(axes: Any, lines: dict[str, str]) -> None:
         )
 
 
-def _draw_map(axes: Any, grid: Scores, chosen: dict[str, Assessment], parts: 'list[Part]') -> None:
+def _draw_map(axes: Any, grid: Scores, chosen: dict[str, Assessment], on_sale: Mapping[str, Sequence[float]]) -> None:
     """Steps from the worst start over k and b."""
     k, b, steps, verdict = (column.reshape(GRID, GRID) for column in (grid.k, grid.b, grid.steps, grid.verdict))
     image = axes.pcolormesh(
@@ -106,11 +96,9 @@ def _draw_map(axes: Any, grid: Scores, chosen: dict[str, Assessment], parts: 'li
             label=name,
             linestyle='none',
         )
-    if parts:
-        for kind, line in (('spring', axes.axhline), ('dashpot', axes.axvline)):
-            for part in parts:
-                if part.kind == kind:
-                    line(part.value, color='0.35', linewidth=0.5)
+    for kind, line in (('spring', axes.axhline), ('dashpot', axes.axvline)):
+        for value in on_sale[kind]:
+            line(value, color='0.35', linewidth=0.5)
     axes.set(
         xscale='log',
         yscale='log',
@@ -127,7 +115,7 @@ def _draw_paths(axes: Any, task: Task, chosen: dict[str, Assessment]) -> None:
     """The error at each strike of the front wheel, from every start."""
     scale = -100.0 / (2.0 * task.rig.rear.alpha)
     band = abs(scale) * task.band
-    axes.axhspan(-band, band, color='#009E73', alpha=0.18, linewidth=0, label=f'±{band:g} %')
+    axes.axhspan(-band, band, color=BAND, alpha=0.18, linewidth=0, label=f'±{band:g} %')
     shown = 1
     for (name, found), colour, style in zip(chosen.items(), COLOURS, ('-', '--', ':'), strict=False):
         for number, path in enumerate(found.paths):

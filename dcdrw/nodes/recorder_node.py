@@ -17,12 +17,12 @@ from dcdrw.recordings.recorder import (
     FLUSH_SECONDS,
     PARAMETERS,
     Recorder,
-    RecorderParams,
     new_folder,
     offered_qos,
     write_whole,
 )
 from dcdrw.suite.executables import EXECUTABLES, RECORDED, RECORDER
+from dcdrw.suite.recorder_params import RecorderParams
 from dcdrw_msgs_py.diagnosis import STATE, Diagnosis, Level, RecorderState, messages_of, parameters_of
 from dcdrw_msgs_py.node import Parameters, message_type, report, run, steady_clock
 from dcdrw_msgs_py.quantity import fields

@@ -14,11 +14,10 @@ from contextlib import suppress
 from datetime import datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Any
 
 import dcdrw
 from dcdrw.recordings.bag_file import RecordedTopic
-from dcdrw_msgs_py.quantity import Quantity
 from dcdrw_msgs_py.yaml_file import parse_yaml, yaml_text
 
 FLUSH_SECONDS = 0.5
@@ -44,25 +43,6 @@ def require_libraries() -> None:
         import rosbags  # noqa: F401
     except ImportError:
         raise ValueError("a recording needs rosbags and mcap: pip install 'dcdrw[record]'") from None
-
-
-class RecorderParams(NamedTuple):
-    """What the recorder writes, and where to."""
-
-    folder: Annotated[
-        str,
-        Quantity(
-            "the recording's folder, which must not exist; empty: recordings/DATE-TIME, a new one for each", live=True
-        ),
-    ] = ''
-    note: Annotated[str, Quantity('what the operator has to say of the recording', live=True)] = ''
-    topics: Annotated[
-        str,
-        Quantity(
-            'further topics, images for instance, separated by spaces, or each with its type as NAME:TYPE',
-        ),
-    ] = ''
-    record: Annotated[bool, Quantity('begin at once: else when ~/record says so')] = False
 
 
 def offered_qos(reliable: bool, latched: bool, depth: int = 0) -> dict[str, Any]:

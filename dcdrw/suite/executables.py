@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from dcdrw import entry
 from dcdrw.drawings.rig_markers import MarkerParams
-from dcdrw.recordings.recorder import RecorderParams
+from dcdrw.suite.recorder_params import RecorderParams
 from dcdrw_control.legs.params import LegParams
 from dcdrw_control.sync.synchronizer import SynchronizerParams
 from dcdrw_msgs_py.rig import RigParams

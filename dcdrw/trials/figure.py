@@ -6,14 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from dcdrw.canvas import new_figure
 from dcdrw.trials.analysis import Analysis, Floats
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND
+from dcdrw_sim.figures.style import BAND, BLACK, WHEELS, new_figure, save
 
-# Okabe and Ito's palette: told apart by the colour-blind, and in grey by lightness.
-_COLOURS = {FRONT: '#0072B2', REAR: '#D55E00'}
-_PHASE, _BAND, _FORCE = '#000000', '#009E73', '#555555'
+_FORCE = '#555555'
 
 
 def draw_trial(trial: Analysis, title: str, path: Path) -> None:
@@ -37,7 +35,7 @@ def draw_trial(trial: Analysis, title: str, path: Path) -> None:
     for axes in (angles, phase, gait, force):
         axes.spines[['top', 'right']].set_visible(False)
     figure.align_ylabels()
-    figure.savefig(path, dpi=120)
+    save(figure, path)
 
 
 def _legend(axes: Any) -> None:
@@ -61,7 +59,7 @@ def _draw_angles(axes: Any, trial: Analysis, time: Floats) -> None:
         axes.plot(
             time,
             _broken(theta, math.degrees(trial.pitch)),
-            color=_COLOURS[wheel],
+            color=WHEELS[wheel],
             label=name,
             linewidth=1.3,
             linestyle='-' if wheel == FRONT else '--',
@@ -77,18 +75,18 @@ def _draw_phase(axes: Any, trial: Analysis, time: Floats) -> None:
     axes.axhspan(
         step / 2 - band,
         step / 2 + band,
-        color=_BAND,
+        color=BAND,
         alpha=0.18,
         linewidth=0,
         label=f'±{trial.params.sync.band_percent:g} % of 50 %',
     )
-    axes.axhline(step / 2, color=_BAND, linewidth=1)
-    axes.plot(time, _broken(trial.motion.phi, step), color=_PHASE, linewidth=1.3, label='φ')
+    axes.axhline(step / 2, color=BAND, linewidth=1)
+    axes.plot(time, _broken(trial.motion.phi, step), color=BLACK, linewidth=1.3, label='φ')
     for fall in trial.footfalls:
         if fall.wheel == FRONT and fall.steps == trial.status.steps_to_synchronization:
             axes.axvline(
                 _second(trial, fall.stamp_ns),
-                color=_BAND,
+                color=BAND,
                 linestyle=':',
                 linewidth=1.5,
                 label=f'from step {fall.steps} on',
@@ -113,7 +111,7 @@ def _draw_gait(axes: Any, trial: Analysis, time: Floats) -> None:
                 until - begin,
                 left=begin,
                 height=0.6,
-                color=_COLOURS[wheel],
+                color=WHEELS[wheel],
                 alpha=0.85 if steps % 2 else 0.35,
                 linewidth=0,
             )
@@ -121,7 +119,7 @@ def _draw_gait(axes: Any, trial: Analysis, time: Floats) -> None:
             [time for time, _ in falls[1:]],
             [row + 0.42] * (len(falls) - 1),
             'v',
-            color=_COLOURS[wheel],
+            color=WHEELS[wheel],
             markersize=4,
             clip_on=False,
         )

@@ -1,13 +1,12 @@
 """A walk of people: read from a CSV file or a recording, followed, told and written."""
 
-import csv
-import json
 import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from dcdrw.files import to_json, write_csv, write_text
 from dcdrw.recordings.leg_recording import leg_readings, leg_topics
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.parameter_file import read_parameter_file
@@ -92,23 +91,23 @@ def _told(one: dict[str, Any]) -> str:
     return ', '.join(told)
 
 
-def write_walk(walk: Walk, folder: Path, **more: Any) -> None:
+def write_walk(walk: Walk, folder: Path, source: str, force: bool = False) -> None:
     """Write summary.json, heel_strikes.csv and phases.csv into a folder.
 
     Raises:
+        ValueError: one exists, and force is not used.
         OSError: the disk is full, say.
 
     """
-    content = json.dumps({**more, 'legs': summarize_walk(walk)}, indent=1, ensure_ascii=False)
-    (folder / 'summary.json').write_text(content + '\n', encoding='utf-8')
-    with (folder / 'heel_strikes.csv').open('w', encoding='utf-8', newline='') as file:
-        writer = csv.writer(file)
-        writer.writerow(('leg', 'stamp_ns', 'known_ns'))
-        writer.writerows(walk.strikes)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_text(folder / 'summary.json', to_json({'source': source, 'legs': summarize_walk(walk)}), force)
+    write_csv(folder / 'heel_strikes.csv', ('leg', 'stamp_ns', 'known_ns'), walk.strikes, force)
     legs, wheels = [leg for leg in LEGS if walk.status.legs[leg].heard], (FRONT_WHEEL, REAR_WHEEL)
-    with (folder / 'phases.csv').open('w', encoding='utf-8', newline='') as file:
-        writer = csv.writer(file)
-        writer.writerow(('stamp_ns', *map(str, legs), *wheels))
-        for update in walk.updates:
-            turns = [*(update.legs.get(leg) for leg in legs), *(update.wheels.get(wheel) for wheel in wheels)]
-            writer.writerow((update.stamp_ns, *(turn.angle if turn else '' for turn in turns)))
+    rows = (
+        (
+            update.stamp_ns,
+            *(turn.angle if turn else '' for turn in (*map(update.legs.get, legs), *map(update.wheels.get, wheels))),
+        )
+        for update in walk.updates
+    )
+    write_csv(folder / 'phases.csv', ('stamp_ns', *map(str, legs), *wheels), rows, force)

@@ -15,10 +15,9 @@ from dcdrw.trials.day import RecordedTrial
 from dcdrw.trials.figure import draw_trial
 from dcdrw.trials.summary import final_band
 from dcdrw_msgs_py.diagnosis import PairState
+from dcdrw_sim.figures.style import BAND, BLACK, BLUE, GREEN, ORANGE, PINK, SKY, VERMILION
 
-# Okabe and Ito's palette.
-_COLOURS = '#0072B2', '#D55E00', '#009E73', '#CC79A7', '#56B4E9', '#E69F00', '#000000'
-_BAND = '#009E73'
+_COLOURS = BLUE, VERMILION, GREEN, PINK, SKY, ORANGE, BLACK
 
 _STYLE = """
 :root { color-scheme: light dark; --line: #d0d4da; --soft: #f3f5f7; --ok: #006b4a; --bad: #a33c00; }
@@ -169,7 +168,7 @@ def _picture(trial: RecordedTrial) -> str:
 def _overlay(trials: Sequence[RecordedTrial]) -> str:
     figure, axes = _axes()
     band = max(trial.analysis.params.sync.band_percent for trial in trials)
-    axes.axhspan(50 - band, 50 + band, color=_BAND, alpha=0.18, linewidth=0, label=f'±{band:g} % of 50 %')
+    axes.axhspan(50 - band, 50 + band, color=BAND, alpha=0.18, linewidth=0, label=f'±{band:g} % of 50 %')
     for number, trial in enumerate(trials):
         phases = 50.0 + np.array(trial.analysis.status.history)
         axes.plot(
@@ -191,7 +190,7 @@ def _decay(trial: RecordedTrial) -> str:
     figure, axes = _axes()
     band, errors = trial.analysis.params.sync.band_percent, np.array(trial.analysis.status.history)
     steps = np.arange(1, len(errors) + 1)
-    axes.axhspan(-band, band, color=_BAND, alpha=0.18, linewidth=0, label=f'±{band:g} %')
+    axes.axhspan(-band, band, color=BAND, alpha=0.18, linewidth=0, label=f'±{band:g} %')
     axes.axhline(0.0, color='0.85', linewidth=0.8, zorder=0)
     axes.plot(steps, errors, 'o', color=_COLOURS[0], markersize=4, label='error')
     if not math.isnan(trial.decay.ratio):

@@ -1,11 +1,10 @@
 """The results of a recorded trial: read and judged, held against what its nodes published, written into a folder."""
 
-import csv
-import json
-import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
+from dcdrw.console import Bar
+from dcdrw.files import to_json, write_csv, write_text, write_whole
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.leg_recording import find_topic, leg_topics, namespace_of, wheel_batches
 from dcdrw.recordings.recording import Recording
@@ -14,7 +13,7 @@ from dcdrw.trials.agreement import Agreement, compare
 from dcdrw.trials.analysis import Analysis, analyze
 from dcdrw.trials.figure import draw_trial
 from dcdrw.trials.leg_walk import follow_recording
-from dcdrw.trials.summary import sentence, summarize, to_json
+from dcdrw.trials.summary import sentence, summarize
 from dcdrw_msgs_py.samples import Footfall
 from dcdrw_msgs_py.topics import JOINT_STATES
 
@@ -68,13 +67,11 @@ def _joint_states(recording: Recording, topic: str, rig: Path | None) -> tuple[s
 
 
 def _shown(batches: Iterator[JointBatch], total: int) -> Iterator[JointBatch]:
-    done = 0
-    for batch in batches:
-        yield batch
-        done += batch.messages
-        if sys.stderr.isatty():
-            share = f'{100 * done // total} %' if done < total else ''
-            print(f'\r\x1b[K{share}', end='', file=sys.stderr, flush=True)
+    with Bar('reading', 'messages') as bar:
+        bar.begin(total)
+        for batch in batches:
+            yield batch
+            bar.more(batch.messages)
 
 
 def describe(agreements: dict[str, Agreement]) -> dict[str, dict[str, int]]:
@@ -82,7 +79,7 @@ def describe(agreements: dict[str, Agreement]) -> dict[str, dict[str, int]]:
     return {topic: agreement._asdict() for topic, agreement in agreements.items()}
 
 
-def write_results(trial: Analysis, folder: Path, **more: object) -> None:
+def write_results(trial: Analysis, folder: Path, more: Mapping[str, object], force: bool = False) -> None:
     """Write summary.json, samples.csv, footfalls.csv and, where there is something to draw, trial.png into a folder.
 
     Raises:
@@ -90,15 +87,11 @@ def write_results(trial: Analysis, folder: Path, **more: object) -> None:
         OSError: the disk is full, say.
 
     """
-    content = json.dumps(to_json({**more, **summarize(trial)._asdict()}), indent=1, ensure_ascii=False)
-    (folder / 'summary.json').write_text(content + '\n', encoding='utf-8')
-    with (folder / 'samples.csv').open('w', encoding='utf-8', newline='') as file:
-        writer = csv.writer(file)
-        writer.writerow(SAMPLES_HEADER)
-        writer.writerows(zip(*(getattr(trial.motion, name).tolist() for name in SAMPLES_HEADER), strict=True))
-    with (folder / 'footfalls.csv').open('w', encoding='utf-8', newline='') as file:
-        writer = csv.writer(file)
-        writer.writerow(Footfall._fields)
-        writer.writerows(trial.footfalls)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_text(folder / 'summary.json', to_json({**more, **summarize(trial)._asdict()}), force)
+    samples = zip(*(getattr(trial.motion, name).tolist() for name in SAMPLES_HEADER), strict=True)
+    write_csv(folder / 'samples.csv', SAMPLES_HEADER, samples, force)
+    write_csv(folder / 'footfalls.csv', Footfall._fields, trial.footfalls, force)
     if trial.ran:
-        draw_trial(trial, sentence(trial), folder / 'trial.png')
+        with write_whole(folder / 'trial.png', force) as unfinished:
+            draw_trial(trial, sentence(trial), unfinished)

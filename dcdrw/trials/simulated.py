@@ -2,19 +2,19 @@
 
 import math
 import os
-import signal
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from dcdrw.console import interruptible
 from dcdrw.recordings.bag_folder import RECORDING
-from dcdrw.recordings.recorder import RecorderParams
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.executables import RECORDER, SIMULATOR, TAG_TRACKER, TRIAL, VIRTUAL_CAMERA, Executable
 from dcdrw.suite.parameter_file import TrialParams, write_parameter_file
 from dcdrw.suite.processes import NodeProcess
+from dcdrw.suite.recorder_params import RecorderParams
 from dcdrw.trials.agreement import Agreement
 from dcdrw.trials.analysis import Analysis, analyze
 from dcdrw.trials.filmed_rig import FilmedRig, TruthError, truth_error
@@ -45,7 +45,8 @@ class Course(NamedTuple):
 
     failure: str
     """Why it ended early or cannot be judged; empty where it ran to its end or was interrupted."""
-    interrupted: bool
+    interrupted: list[int]
+    """The signals that ended it early."""
     analysis: Analysis
     """Of what was recorded."""
     agreements: dict[str, Agreement]
@@ -90,7 +91,7 @@ class SimulatedTrial:
         self._seconds, self._note, self._say, self._show = seconds, note, say, show
         self._executables: tuple[Executable, ...] = (*TRIAL, VIRTUAL_CAMERA, TAG_TRACKER) if filmed else TRIAL
         self._nodes: list[NodeProcess] = []
-        self._interrupted = False
+        self._interrupted: list[int] = []
 
     def run(self) -> Course:
         """Run it, until its end, a failure or a signal."""
@@ -101,12 +102,8 @@ class SimulatedTrial:
         from dcdrw.nodes.observer import Observer
         from dcdrw_msgs_py.executor import StreamExecutor
 
-        def interrupt(*_: object) -> None:
-            self._interrupted = True
-
         with ExitStack() as stack:
-            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-                stack.callback(signal.signal, number, signal.signal(number, interrupt))
+            self._interrupted = stack.enter_context(interruptible())
             rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
             stack.callback(rclpy.try_shutdown)
             self._observer = Observer(self._params.sync)

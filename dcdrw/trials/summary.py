@@ -1,8 +1,6 @@
 """What a trial came to: figures for a program, a sentence for a person."""
 
 import math
-from collections.abc import Mapping
-from enum import Enum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -114,21 +112,6 @@ def final_band(trial: Analysis) -> tuple[float, float]:
     if np.isnan(errors).all():
         return math.nan, math.nan
     return float(np.nanmin(errors)), float(np.nanmax(errors))
-
-
-def to_json(value: object) -> Any:
-    """A result as JSON has it: named tuples and mappings as objects, NaN as null, states by their names."""
-    if isinstance(value, Enum):
-        return value.value
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, tuple) and hasattr(value, '_asdict'):
-        return to_json(value._asdict())
-    if isinstance(value, Mapping):
-        return {str(name): to_json(item) for name, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [to_json(item) for item in value]
-    return value
 
 
 def _known(value: float) -> float | None:

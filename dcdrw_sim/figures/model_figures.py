@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 
 from dcdrw_msgs_py.rig import RigParams, WheelParams
+from dcdrw_sim.figures.style import BLACK, BLUE, GREEN, ORANGE, VERMILION
 from dcdrw_sim.model.dynamics import gentlest_slope, limit_cycle_speed
 from dcdrw_sim.relatives.footfall_order import FEET, Contact, order
 from dcdrw_sim.relatives.rigid_pair import NEAR_TOGETHER, RigidPair, energy_per_metre, fastest_phase, slope_for_velocity
 from dcdrw_sim.relatives.rimless_wheel import Fate, fate, limit_cycle_velocity, steepest_slope
 
-# Okabe and Ito's palette: told apart by the colour-blind, and in grey by lightness.
-BLUE, ORANGE, VERMILION, GREEN, BLACK = '#0072B2', '#E69F00', '#D55E00', '#009E73', '#000000'
 _ROLLS, _STANDS = '#DCEFFA', '0.62'
 
 

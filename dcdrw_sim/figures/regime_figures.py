@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dcdrw_msgs_py.rig import RigParams
-from dcdrw_sim.figures.model_figures import BLACK, BLUE, VERMILION
+from dcdrw_sim.figures.style import BLACK, BLUE, VERMILION
 from dcdrw_sim.figures.sweep_figures import label_coupler_axes
 from dcdrw_sim.model.dynamics import gentlest_slope
 from dcdrw_sim.model.scaling import nondimensional

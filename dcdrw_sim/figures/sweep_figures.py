@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dcdrw_msgs_py.rig import RigParams
-from dcdrw_sim.figures.model_figures import BLACK, BLUE, GREEN, ORANGE, VERMILION
+from dcdrw_sim.figures.style import BLACK, BLUE, GREEN, ORANGE, PINK, SKY, VERMILION
 from dcdrw_sim.map.regression import Regression, fit_affine, fit_raw
 from dcdrw_sim.model.dynamics import State
 from dcdrw_sim.motion.trajectory import run
@@ -25,7 +25,7 @@ EIGENVALUES = {
     'multipliers': 'exact multiplier',
 }
 """What can be drawn over k and b, and its name."""
-STARTS = (BLUE, VERMILION, GREEN, ORANGE, '#56B4E9', '#CC79A7', BLACK, '#999999', '#882255')
+STARTS = (BLUE, VERMILION, GREEN, ORANGE, SKY, PINK, BLACK, '#999999', '#882255')
 """Colours of the starts: Okabe and Ito's, and one more."""
 SAMPLES = 4000
 """Of a motion that is drawn."""

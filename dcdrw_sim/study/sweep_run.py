@@ -4,9 +4,10 @@ import fcntl
 import json
 import os
 import shutil
+import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, wait
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,7 +16,7 @@ import numpy as np
 from dcdrw_sim.study.sweep import Block, Sweep, block_size, blocks, check_sweep, compute
 from dcdrw_sim.study.sweep_dataset import Arrays, open_sweep, require_extra, sweep_of, write
 
-_SPECIFICATION = 'sweep.json'
+_SPECIFICATION, _LOCK = 'sweep.json', 'lock'
 
 
 class Progress(NamedTuple):
@@ -76,7 +77,7 @@ def run_sweep(
         unfinished = parts.folder / 'sweep.nc'
         write(unfinished, sweep, ((block, parts.load(block)) for block in parts.blocks), parts.steps())
         os.replace(unfinished, path)
-        shutil.rmtree(parts.folder)
+        parts.remove()
 
 
 class _Parts:
@@ -91,20 +92,16 @@ class _Parts:
     def opened(cls, path: Path, sweep: Sweep) -> Iterator['_Parts']:
         """The folder of a sweep, new or as it was left, and nobody else's meanwhile."""
         folder = path.with_name(path.name + '.parts')
-        folder.mkdir(parents=True, exist_ok=True)
-        with open(folder / 'lock', 'w') as lock:
+        specification = folder / _SPECIFICATION
+        if not specification.exists():
+            if folder.exists():
+                raise ValueError(f'{folder} exists already and holds no unfinished sweep; choose another file')
+            _make_folder(folder, json.dumps({'sweep': sweep.to_json(), 'block_size': block_size(sweep)}))
+        with open(folder / _LOCK, 'w') as lock:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 raise OSError(f'another process is at work in {folder}') from None
-            specification = folder / _SPECIFICATION
-            if not specification.exists():
-                _write_whole(
-                    specification,
-                    lambda file: file.write(
-                        json.dumps({'sweep': sweep.to_json(), 'block_size': block_size(sweep)}).encode()
-                    ),
-                )
             content = json.loads(specification.read_bytes())
             _require_same(folder, Sweep.from_json(content['sweep']), sweep)
             yield cls(folder, sweep, content['block_size'])
@@ -144,11 +141,30 @@ class _Parts:
                 longest = max(longest, int(arrays['section_time'].shape[-1]))
         return longest
 
+    def remove(self) -> None:
+        """Remove the folder; what somebody else has put into it stays, and so does the folder then."""
+        for file in (*map(self._file, self.blocks), self.folder / _SPECIFICATION, self.folder / _LOCK):
+            file.unlink(missing_ok=True)
+            file.with_suffix('.tmp').unlink(missing_ok=True)  # of a process that was killed
+        with suppress(OSError):
+            self.folder.rmdir()
+
     def _save(self, block: Block, arrays: Arrays) -> None:
         _write_whole(self._file(block), lambda file: np.savez(file, **arrays))  # type: ignore[arg-type]
 
     def _file(self, block: Block) -> Path:
         return self.folder / f'{block[0].start}-{block[1].start}.npz'
+
+
+def _make_folder(folder: Path, specification: str) -> None:
+    """Make a folder of parts that holds its specification from the first instant on."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    new = Path(tempfile.mkdtemp(prefix=f'.{folder.name}.', dir=folder.parent))
+    (new / _SPECIFICATION).write_text(specification, encoding='utf-8')
+    try:
+        new.rename(folder)
+    except OSError:  # another process was quicker
+        shutil.rmtree(new)
 
 
 def _points(block: Block) -> int:

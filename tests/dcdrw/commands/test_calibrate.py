@@ -7,8 +7,8 @@ import pytest
 import yaml
 
 from dcdrw.cli import main
-from dcdrw.commands.track import TrackingParams
 from dcdrw.suite.parameter_file import read_parameter_file
+from dcdrw.trials.filmed import TrackingParams
 
 pytest.importorskip('cv2')
 SMALL = ['--image-width', '640', '--image-height', '360', '--fps', '30', '--grey', '--quiet']

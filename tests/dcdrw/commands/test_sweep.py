@@ -141,7 +141,7 @@ def test_an_axis_that_is_none_is_told(capsys):
     assert 'did you mean slope?' in capsys.readouterr().err
 
 
-@pytest.mark.parametrize('module', ['xarray', 'netCDF4', 'tqdm'])
+@pytest.mark.parametrize('module', ['xarray', 'netCDF4'])
 def test_a_missing_library_is_told(tmp_path, monkeypatch, capsys, module):
     monkeypatch.setitem(sys.modules, module, None)
     assert main(['sweep', '--out', str(tmp_path / 'sweep.nc'), *QUICK]) == 2
