@@ -32,6 +32,7 @@ from typing import Any
 import numpy as np
 import trajectories
 
+from dcdrw_sim.model.rigs import take
 from dcdrw_sim.motion import ensemble
 from dcdrw_sim.study.points import run_starts
 from dcdrw_sim.study.sweep import Axis, block_size, blocks, compute, papers_sweep, rigs_of, room
@@ -58,7 +59,7 @@ def bare_kernel() -> Callable[[int], None]:
         jobs.append(
             (
                 ensemble._aligned(ensemble.SIZE),
-                ensemble._parameters(ensemble.take(pairs, part)),
+                ensemble._parameters(take(pairs, part)),
                 starts[part],
                 SWEEP.seconds,
                 ensemble.TOLERANCE,

@@ -32,8 +32,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from dcdrw_sim.model.dynamics import State, limit_cycle_speed
+from dcdrw_sim.model.dynamics import State
 from dcdrw_sim.model.presets import preset
+from dcdrw_sim.model.wheel import limit_cycle_speed
 from dcdrw_sim.motion import pair as simulation
 from dcdrw_sim.motion import trajectory
 from dcdrw_sim.motion.compiled import AVAILABLE

@@ -4,6 +4,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from dcdrw_msgs_py.quantity import Quantity
+from dcdrw_msgs_py.rolling import default_rest_length, default_stance_distance, step_length
 
 FRONT = 'front'
 REAR = 'rear'
@@ -38,7 +39,7 @@ class WheelShape(NamedTuple):
     @property
     def step_length(self) -> float:
         """Distance between two footholds, σ = 2 ℓ sin α [m] (paper's (14), with ℓ_i)."""
-        return 2.0 * self.length * math.sin(self.alpha)
+        return step_length(self.length, self.alpha)
 
 
 class WheelParams(NamedTuple):
@@ -56,7 +57,7 @@ class WheelParams(NamedTuple):
     @property
     def step_length(self) -> float:
         """Distance between two footholds, σ = 2 ℓ sin α [m]."""
-        return WheelShape(self.length, self.spokes).step_length
+        return step_length(self.length, self.alpha)
 
 
 StanceDistance = Annotated[
@@ -68,6 +69,8 @@ StanceDistance = Annotated[
     ),
 ]
 Slope = Annotated[float, Quantity('slope γ, positive downhill', 'rad', low=-math.pi / 4, high=math.pi / 4, live=True)]
+
+Gravity = Annotated[float, Quantity('gravitational acceleration g', 'm/s²', above=0.0)]
 
 
 class RigParams(NamedTuple):
@@ -83,11 +86,10 @@ class RigParams(NamedTuple):
     ] = math.nan
     S0: StanceDistance = math.nan
     slope: Slope = math.radians(2.0)
-    gravity: Annotated[float, Quantity('gravitational acceleration g', 'm/s²', above=0.0)] = 9.81
+    gravity: Gravity = 9.81
 
     def resolved(self) -> 'RigParams':
         """The same rig with its derived defaults filled in."""
         front = self.front
-        S0 = front.length if math.isnan(self.S0) else self.S0
-        D0 = S0 + front.length * math.sin(front.alpha) if math.isnan(self.D0) else self.D0
-        return self._replace(S0=S0, D0=max(D0, 0.0))
+        S0 = default_stance_distance(self.S0, front.length)
+        return self._replace(S0=S0, D0=default_rest_length(self.D0, S0, front.length, front.alpha))

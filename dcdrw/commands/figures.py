@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-import dcdrw_sim
 from dcdrw.console import Bar, cores
 from dcdrw.drawings.figure_files import add_formats, figure_files, write_figure
 from dcdrw.files import add_force, refuse_existing
@@ -19,6 +18,7 @@ from dcdrw_sim.figures.style import new_figure
 from dcdrw_sim.map.return_map import ReturnMap
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.rig.simulator import SimulatorParams
+from dcdrw_sim.source import fingerprint
 from dcdrw_sim.study.basin import SECONDS, basin, least_speeds
 from dcdrw_sim.study.sweep import POINTS, RANGES, Axis, Sweep, papers_sweep
 from dcdrw_sim.study.sweep_dataset import open_sweep, require_extra
@@ -32,6 +32,8 @@ BASINS = ((5e-3, 0.15), (5e-3, 3.0))
 LONG, LONG_POINTS = 1000.0, 40
 """Time units in which all that walks is decided, but the slowest, and points along each axis there."""
 SLOPES, DAMPINGS = (1.1, 2.6), (1e-2, 1e2)
+COMPUTES = ('dcdrw_msgs_py', *(f'dcdrw_sim.{room}' for room in ('model', 'motion', 'map', 'relatives', 'study')))
+"""Packages on which a sweep depends."""
 EXPERIMENT_SECONDS, EXPERIMENT_BAND = 5.0, 6.0
 
 _EPILOG = """\
@@ -215,11 +217,7 @@ def _paper(book: Book, points: int = POINTS) -> Sweep:
 
 def _key(sweep: Sweep) -> str:
     """What tells a sweep from every other: its exact parameters, and the code that computes it."""
-    content = hashlib.sha256(sweep.to_json().encode())
-    for path in sorted(Path(dcdrw_sim.__file__).parent.rglob('*.py')):
-        if not path.stem.endswith('figures'):
-            content.update(path.read_bytes())
-    return content.hexdigest()[:16]
+    return hashlib.sha256((sweep.to_json() + fingerprint(*COMPUTES)).encode()).hexdigest()[:16]
 
 
 def _default_cache() -> Path:

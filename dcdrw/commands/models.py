@@ -15,7 +15,7 @@ from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelParams
 from dcdrw_sim.figures import model_figures
 from dcdrw_sim.figures.style import new_figure
 from dcdrw_sim.map.return_map import ReturnMap
-from dcdrw_sim.model.dynamics import gentlest_slope, limit_cycle_speed
+from dcdrw_sim.model.wheel import gentlest_slope, limit_cycle_speed
 from dcdrw_sim.relatives import rigid_pair, rimless_wheel
 from dcdrw_sim.relatives.footfall_order import order, rear_lead, steady_contacts
 from dcdrw_sim.relatives.rigid_pair import NEAR_TOGETHER, RigidPair

@@ -13,8 +13,9 @@ from dcdrw.suite.parameter_file import add_rig_options, chosen_params
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.map.return_map import NoReturnError, ReturnMap
-from dcdrw_sim.model.dynamics import State, gentlest_slope
+from dcdrw_sim.model.dynamics import State
 from dcdrw_sim.model.scaling import nondimensional
+from dcdrw_sim.model.wheel import gentlest_slope
 from dcdrw_sim.motion.ensemble import spread
 from dcdrw_sim.motion.trajectory import run as simulate
 from dcdrw_sim.relatives.even_gait import even_gait_on, even_stall_band, gentlest_even_gait

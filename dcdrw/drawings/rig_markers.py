@@ -14,6 +14,7 @@ from typing import Annotated, NamedTuple
 from dcdrw_msgs_py.diagnosis import Diagnosis, Level
 from dcdrw_msgs_py.quantity import Quantity
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, Slope, StanceDistance, WheelShape
+from dcdrw_msgs_py.rolling import phi_pitch, regular_stance_distance, stance_distance_by_hubs
 from dcdrw_msgs_py.samples import JointSample
 from dcdrw_tracker.gait.diagnostics import phase_text
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams, PhaseUpdate
@@ -98,18 +99,8 @@ class RigView:
         """
         front, rear = self.params.front, self.params.rear
         theta1, theta2 = update.phase.front.angle, update.phase.rear.angle
-        length = joints.coupler.length
-        if math.isfinite(length):
-            height = front.length * math.cos(theta1) - rear.length * math.cos(theta2)
-            S = (
-                math.sqrt(max(length**2 - height**2, 0.0))
-                - front.length * math.sin(theta1)
-                + rear.length * math.sin(theta2)
-            )
-        else:
-            S = front.length if math.isnan(self.params.S0) else self.params.S0
-            if theta1 * front.spokes < theta2 * rear.spokes:
-                S += front.step_length
+        regular = regular_stance_distance(front, rear, self.params.S0, theta1, theta2)
+        S = stance_distance_by_hubs(front, rear, theta1, theta2, joints.coupler.length, regular)
         status = self._estimator.status()
         self._stance = S - status.front_steps * front.step_length + status.rear_steps * rear.step_length
         for falls in self._falls.values():
@@ -195,7 +186,7 @@ class RigView:
             params.slope + math.atan2(z2 - z1, x1 - x2),
             tuple(coupler_lines(math.hypot(x1 - x2, z1 - z2), 0.1 * size)),
         )
-        lines = [phase_text(phase.phi.angle / (params.front.alpha + params.rear.alpha)), f'n = {phase.step_difference}']
+        lines = [phase_text(phase.phi.angle / phi_pitch(params.front, params.rear)), f'n = {phase.step_difference}']
         if math.isfinite(self._force):
             lines[1] += f', coupler {self._force:+.1f} N'
         if says:

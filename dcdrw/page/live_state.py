@@ -19,6 +19,7 @@ from dcdrw_msgs_py.diagnosis import (
 )
 from dcdrw_msgs_py.quantity import Field, fields, lookup
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
+from dcdrw_msgs_py.rolling import default_stance_distance, phi_pitch, stance, stance_distance_by_hubs
 from dcdrw_msgs_py.samples import Footfall, JointSample, PhaseSample
 from dcdrw_tracker.gait.diagnostics import diagnose_sync
 from dcdrw_tracker.gait.pair_state import judge
@@ -269,15 +270,14 @@ class LiveState:
         joints = known.get(phase.stamp_ns, JointSample(phase.stamp_ns, phase.front, phase.rear))
         front, rear = self._params.phase.front, self._params.phase.rear
         theta1, theta2 = phase.front.angle, phase.rear.angle
-        pitch = self._params.sync.front.alpha + self._params.sync.rear.alpha
-        share = 100.0 * phase.phi.angle / pitch
+        share = 100.0 * phase.phi.angle / phi_pitch(front, rear)
         return {
             'stamp_ns': str(phase.stamp_ns),  # JavaScript's numbers do not hold it
             'theta': [_rounded(theta1, 5), _rounded(theta2, 5)],
             # Which spoke stands: it shows that the wheels roll.
             'legs': [
-                _rounded((joints.front.angle - theta1) / (2.0 * front.alpha), 0),
-                _rounded((joints.rear.angle - theta2) / (2.0 * rear.alpha), 0),
+                _rounded(stance(front.alpha, joints.front.angle - theta1)[0], 0),
+                _rounded(stance(rear.alpha, joints.rear.angle - theta2)[0], 0),
             ],
             'n': phase.step_difference,
             'S': _rounded(self._stance_distance(phase, joints.coupler.length), 5),
@@ -293,13 +293,9 @@ class LiveState:
         if len(self._feet) == 2:
             S = self._feet[FRONT] - self._feet[REAR]
         else:  # a trial starts just after a strike of the front wheel
-            S0 = front.length if math.isnan(self._params.phase.S0) else self._params.phase.S0
+            S0 = default_stance_distance(self._params.phase.S0, front.length)
             S = S0 + (1 + phase.step_difference) * front.step_length
-        dx = front.length * math.sin(phase.front.angle) - rear.length * math.sin(phase.rear.angle)
-        dy = front.length * math.cos(phase.front.angle) - rear.length * math.cos(phase.rear.angle)
-        if not D >= abs(dy):
-            return S
-        return math.copysign(math.sqrt(D * D - dy * dy), S + dx) - dx
+        return stance_distance_by_hubs(front, rear, phase.front.angle, phase.rear.angle, D, S)
 
     def _board(self, status: SyncStatus, now: float) -> dict[str, Any]:
         """What seldom changes."""
@@ -309,7 +305,7 @@ class LiveState:
         return {
             'wheels': [[shape.length, shape.spokes] for shape in shapes],
             'slope': params.rig.slope,
-            'pitch_deg': math.degrees(params.sync.front.alpha + params.sync.rear.alpha),
+            'pitch_deg': math.degrees(phi_pitch(params.sync.front, params.sync.rear)),
             'band_percent': params.sync.band_percent,
             'rate': _rounded(self._rate, 0),
             'steps': status.steps,

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.suite.parameter_file import TrialParams
 from dcdrw_msgs_py.diagnosis import PairState
+from dcdrw_msgs_py.rolling import phi_pitch
 from dcdrw_msgs_py.samples import SECOND, CouplerSample, Footfall, JointSample, PhaseSample, Turn, run_of
 from dcdrw_tracker.gait.pair_state import judge
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseStatus
@@ -89,7 +90,7 @@ class Analysis(NamedTuple):
     @property
     def pitch(self) -> float:
         """The angle φ of a whole step, α1 + α2 [rad]."""
-        return self.params.sync.front.alpha + self.params.sync.rear.alpha
+        return phi_pitch(self.params.sync.front, self.params.sync.rear)
 
     @property
     def state(self) -> PairState:

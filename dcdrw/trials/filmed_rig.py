@@ -11,6 +11,7 @@ from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw.trials.analysis import Analysis
 from dcdrw_msgs_py.rig import WheelShape
+from dcdrw_msgs_py.rolling import steps_ahead
 from dcdrw_msgs_py.tagging import TagParams, mounts
 from dcdrw_msgs_py.topics import FRONT_WHEEL, REAR_WHEEL
 from dcdrw_sim.camera.render import LookParams
@@ -41,7 +42,9 @@ def filmed_rig(options: argparse.Namespace, params: TrialParams) -> FilmedRig:
     """
     rig = params.rig
     front, rear = (WheelShape(wheel.length, wheel.spokes) for wheel in (rig.front, rig.rear))
-    filmed = FilmedRig(SceneParams(front, rear, rig.S0, rig.slope), track=TrackParams(front, rear, rig.slope))
+    filmed = FilmedRig(
+        SceneParams(front, rear, rig.S0, rig.slope), track=TrackParams(front, rear, rig.slope, rig.gravity)
+    )
     if options.rig:
         filmed = read_parameter_file(options.rig, filmed)
     mounts(filmed.tags)
@@ -78,7 +81,6 @@ def truth_error(trial: Analysis, truth: Iterable[JointBatch]) -> TruthError | No
         return None
     times = (motion.stamp_ns[both] - stamps[0]) * 1e-9
     psi1, psi2 = (np.interp(times, (stamps - stamps[0]) * 1e-9, column) for column in psi.T)
-    alpha1, alpha2 = trial.params.phase.front.alpha, trial.params.phase.rear.alpha
-    off = motion.phi[both] / trial.pitch - 0.5 * (psi1 / alpha1 - psi2 / alpha2)
+    off = motion.phi[both] / trial.pitch - steps_ahead(trial.params.phase.front, trial.params.phase.rear, psi1, psi2)
     error = trial.pitch * (off - np.round(off))
     return TruthError(math.degrees(math.sqrt(float((error**2).mean()))), int(both.sum()))

@@ -14,6 +14,7 @@ from dcdrw.suite.parameter_file import given
 from dcdrw_msgs_py.camera import write_camera
 from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
+from dcdrw_msgs_py.rolling import phase, phi_pitch
 from dcdrw_msgs_py.samples import SECOND, CouplerSample, JointSample, Turn
 from dcdrw_msgs_py.tagging import TagParams
 from dcdrw_msgs_py.yaml_file import yaml_text
@@ -175,8 +176,8 @@ class Shots:
     def truth(self, joints: JointSample) -> tuple[float, ...]:
         """The row of a frame (`TRUTH`), the simulation being there."""
         rig, (n1, n2) = self.simulation.rig, self.simulation.steps
-        phase = (joints.front.angle / (2.0 * rig.front.alpha) - joints.rear.angle / (2.0 * rig.rear.alpha)) % 1.0
-        return joints.stamp_ns, *joints.front, *joints.rear, phase * (rig.front.alpha + rig.rear.alpha), n1 - n2
+        phi = phase(rig.front, rig.rear, joints.front.angle, joints.rear.angle) * phi_pitch(rig.front, rig.rear)
+        return joints.stamp_ns, *joints.front, *joints.rear, phi, n1 - n2
 
 
 class Video:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from dcdrw_msgs_py.camera import Camera, pinhole, read_camera
 from dcdrw_msgs_py.quantity import Quantity
 from dcdrw_msgs_py.rig import RigParams, Slope, StanceDistance, WheelShape
+from dcdrw_msgs_py.rolling import regular_stance_distance, stance, stance_distance_by_hubs
 from dcdrw_msgs_py.samples import JointSample, Turn
 
 Floats = NDArray[np.float64]
@@ -192,17 +193,11 @@ class Footing:
 
     def __init__(self, scene: SceneParams, first: JointSample) -> None:
         front, rear = scene.wheels
-        (self._steps1, theta1), (self._steps2, theta2) = (
-            _stance(shape, turn.angle) for shape, turn in zip(scene.wheels, (first.front, first.rear), strict=True)
-        )
-        length, rise = first.coupler.length, front.length * math.cos(theta1) - rear.length * math.cos(theta2)
-        if abs(rise) < length < LONGEST * (front.length + rear.length):
-            self._ahead = (
-                math.sqrt(length**2 - rise**2) - front.length * math.sin(theta1) + rear.length * math.sin(theta2)
-            )
-        else:
-            n = theta1 / front.alpha < theta2 / rear.alpha
-            self._ahead = (front.length if math.isnan(scene.S0) else scene.S0) + n * front.step_length
+        self._steps1, theta1 = stance(front.alpha, first.front.angle)
+        self._steps2, theta2 = stance(rear.alpha, first.rear.angle)
+        D = first.coupler.length if first.coupler.length < LONGEST * (front.length + rear.length) else math.nan
+        regular = regular_stance_distance(front, rear, scene.S0, theta1, theta2)
+        self._ahead = stance_distance_by_hubs(front, rear, theta1, theta2, D, regular)
         self._front, self._rear = front, rear
 
     def places(self, psi1: float, psi2: float) -> tuple[WheelPlace, WheelPlace]:
@@ -210,14 +205,8 @@ class Footing:
         return (_placed(self._front, psi1, self._steps1, self._ahead), _placed(self._rear, psi2, self._steps2, 0.0))
 
 
-def _stance(shape: WheelShape, psi: float) -> tuple[int, float]:
-    """The stance spoke's number, and its angle θ from the slope's normal."""
-    steps = math.floor((psi + shape.alpha) / (2.0 * shape.alpha))
-    return steps, psi - 2.0 * shape.alpha * steps
-
-
-def _placed(shape: WheelShape, psi: float, first: int, start: float) -> WheelPlace:
-    steps, theta = _stance(shape, psi)
+def _placed(shape: WheelShape, psi: float, first: float, start: float) -> WheelPlace:
+    steps, theta = stance(shape.alpha, psi)
     foot = start + (steps - first) * shape.step_length
     return WheelPlace(foot + shape.length * math.sin(theta), shape.length * math.cos(theta), psi)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_sim.figures.style import BLACK, BLUE, GREEN, ORANGE, VERMILION
-from dcdrw_sim.model.dynamics import gentlest_slope, limit_cycle_speed
+from dcdrw_sim.model.wheel import gentlest_slope, limit_cycle_speed
 from dcdrw_sim.relatives.footfall_order import FEET, Contact, order
 from dcdrw_sim.relatives.rigid_pair import NEAR_TOGETHER, RigidPair, energy_per_metre, fastest_phase, slope_for_velocity
 from dcdrw_sim.relatives.rimless_wheel import Fate, fate, limit_cycle_velocity, steepest_slope

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.figures.style import BLACK, BLUE, VERMILION
 from dcdrw_sim.figures.sweep_figures import label_coupler_axes
-from dcdrw_sim.model.dynamics import gentlest_slope
 from dcdrw_sim.model.scaling import nondimensional
+from dcdrw_sim.model.wheel import gentlest_slope
 from dcdrw_sim.motion.ensemble import spread
 from dcdrw_sim.relatives.even_gait import gentlest_even_gait
 from dcdrw_sim.study.basin import Basin

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.rolling import phi_pitch, steps_ahead
 from dcdrw_sim.figures.style import BLACK, BLUE, GREEN, ORANGE, PINK, SKY, VERMILION
 from dcdrw_sim.map.regression import Regression, fit_affine, fit_raw
 from dcdrw_sim.model.dynamics import State
@@ -154,14 +155,14 @@ def draw_experiment(angles: Any, phase: Any, rig: RigParams, start: State, secon
 
     """
     motion = run(rig, start, seconds).at(np.linspace(0.0, seconds, SAMPLES))
-    pitch = math.degrees(rig.front.alpha + rig.rear.alpha)
+    pitch = math.degrees(phi_pitch(rig.front, rig.rear))
     for theta, colour, style, name in (
         (motion.theta1, BLUE, '-', 'θ₁ front'),
         (motion.theta2, VERMILION, '--', 'θ₂ rear'),
     ):
         angles.plot(motion.time, _broken(np.degrees(theta), pitch), color=colour, linestyle=style, label=name)
     angles.set_ylabel('stance angle [°]')
-    turns = motion.rotation1 / (2.0 * rig.front.alpha) - motion.rotation2 / (2.0 * rig.rear.alpha)
+    turns = steps_ahead(rig.front, rig.rear, motion.rotation1, motion.rotation2)
     band = band_percent / 100.0 * pitch
     phase.axhspan(
         0.5 * pitch - band,

@@ -5,15 +5,17 @@ motion, with an error of about 1e-9, thousands of pairs in the time of one by th
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dcdrw_msgs_py.values import each
 from dcdrw_sim.map.return_map import PROGRESS, SINGULAR, TOLERANCE, Complexes, spectrum
-from dcdrw_sim.model.dynamics import kinetic_energy
+from dcdrw_sim.model.rigs import Rigs, take
+from dcdrw_sim.model.wheel import kept, kinetic_energy
 from dcdrw_sim.motion.ends import FORWARD, End
-from dcdrw_sim.motion.ensemble import Rigs, each, run_pairs, take
+from dcdrw_sim.motion.ensemble import run_pairs
 
 Floats = NDArray[np.float64]
 
@@ -67,7 +69,7 @@ class Losses(NamedTuple):
     speed: Floats
     """Mean, down the slope [m/s]."""
     strikes: Floats
-    """Energy lost at the strikes of both wheels [J/m]: ½ m ℓ² ω² sin² 2α each."""
+    """Energy lost at the strikes of both wheels [J/m]: ½ m ℓ² ω² (1 − η²) each."""
     damper: Floats
     """Energy lost in the damper [J/m]: what the strikes leave."""
 
@@ -99,7 +101,7 @@ def find_limit_cycles(rigs: Rigs, starts: Floats) -> LimitCycles:
         np.full(count, math.nan),
         np.full(count, math.nan),
     )
-    sigma1, sigma2 = _step_length(rigs.front), _step_length(rigs.rear)
+    sigma1, sigma2 = rigs.front.step_length, rigs.rear.step_length
     sought = np.flatnonzero(np.isfinite(starts).all(axis=1) & (abs(sigma1 - sigma2) <= EQUAL * sigma1))
     here = np.array(starts, float)
     for _ in range(LIMIT):
@@ -133,9 +135,9 @@ def losses(rigs: Rigs, cycles: LimitCycles) -> Losses:
         cycles: what that found.
 
     """
-    sigma, lost = _step_length(rigs.front), np.zeros(len(cycles.periods))
+    sigma, lost = rigs.front.step_length, np.zeros(len(cycles.periods))
     for wheel, omega in ((rigs.front, cycles.states[:, 0]), (rigs.rear, cycles.omega2)):
-        lost = lost + kinetic_energy(wheel, omega) * each(math.sin, 2.0 * wheel.alpha) ** 2
+        lost = lost + kinetic_energy(wheel, omega) * (1.0 - kept(wheel) ** 2)
     gain = (rigs.front.mass + rigs.rear.mass) * rigs.gravity * each(math.sin, rigs.slope)
     return Losses(sigma / cycles.periods, lost / sigma, gain - lost / sigma)
 
@@ -184,12 +186,6 @@ def _least_squares(matrices: Floats, right: Floats) -> Floats:
     along = np.where(sizes > SINGULAR * sizes[:, :1], along / np.where(sizes > 0.0, sizes, 1.0), 0.0)
     solution: Floats = (vt * along[:, :, None]).sum(axis=1)
     return solution
-
-
-def _step_length(wheel: Any) -> Floats:
-    """2 ℓ sin α of every pair [m]."""
-    step_length: Floats = 2.0 * wheel.length * each(math.sin, wheel.alpha)
-    return step_length
 
 
 def _size(changes: Floats) -> Floats:

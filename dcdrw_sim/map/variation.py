@@ -10,17 +10,15 @@ from collections.abc import Sequence
 from functools import reduce
 from itertools import pairwise
 from operator import matmul
-from typing import Any
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.values import Floats, Real
 from dcdrw_sim.model.dynamics import State, accelerations, coupler, coupler_force, reset, stance_distance
+from dcdrw_sim.model.wheel import inertia, kept, pull
 from dcdrw_sim.motion.pair import Segment
-
-Floats = NDArray[np.float64]
 
 STAGES = 12
 """Points per segment of the Gauss-Legendre method: of order 24, so that rounding is what remains."""
@@ -32,19 +30,20 @@ _INTEGRALS = 0.5 * legendre.legval(_NODES, legendre.legint(_LAGRANGE, lbnd=-1)).
 """[i, j]: what a value at point j of the unit interval adds to the integral up to point i."""
 
 
-def rates(rig: RigParams, state: State, S: float, external_force: float = 0.0) -> Floats:
+def rates(rig: RigParams, state: State, S: Real, external_force: float = 0.0) -> Floats:
     """Rates of [θ1, ω1, θ2, ω2, F], shape (5,)."""
     acceleration1, acceleration2 = accelerations(rig, state, S, external_force)
     return np.array([state.omega1, acceleration1, state.omega2, acceleration2, 0.0])
 
 
-def jacobian(rig: RigParams, state: State, S: Any, external_force: float = 0.0) -> Floats:
+def jacobian(rig: RigParams, state: State, S: Real, external_force: float = 0.0) -> Floats:
     """Derivatives of the rates by state and force, shape (..., 5, 5), at states and stance distances of shape (...)."""
-    (l1, m1, _), (l2, m2, _) = rig.front, rig.rear
+    front, rear = rig.front, rig.rear
+    l1, l2 = front.length, rear.length
     theta1, omega1, theta2, omega2 = np.broadcast_arrays(*state)
     length, rate, p1, p2 = coupler(rig, State(theta1, omega1, theta2, omega2), S)
     cos_difference, zero, one = np.cos(theta1 - theta2), np.zeros(theta1.shape), np.ones(theta1.shape)
-    pull = (coupler_force(rig, length, rate) + external_force) / length
+    tension = (coupler_force(rig, length, rate) + external_force) / length
 
     # Gradients by [θ1, ω1, θ2, ω2, F]: of p1, p2, D, of D Ḋ = ℓ1 p1 ω1 − ℓ2 p2 ω2, and of F/D.
     by_p1 = np.array([l2 * cos_difference - S * np.sin(theta1), zero, -l2 * cos_difference, zero, zero])
@@ -53,16 +52,16 @@ def jacobian(rig: RigParams, state: State, S: Any, external_force: float = 0.0) 
     by_product = l1 * omega1 * by_p1 - l2 * omega2 * by_p2 + np.array([zero, l1 * p1, zero, -l2 * p2, zero])
     by_rate = (by_product - rate * by_length) / length
     by_force = coupler_force(rig._replace(D0=0.0), by_length, by_rate) + np.array([zero, zero, zero, zero, one])
-    by_pull = (by_force - pull * by_length) / length
+    by_pull = (by_force - tension * by_length) / length
 
-    weight1 = rig.gravity / l1 * np.cos(theta1 + rig.slope)
-    weight2 = rig.gravity / l2 * np.cos(theta2 + rig.slope)
+    weight1 = pull(front, rig.gravity) * np.cos(theta1 + rig.slope)
+    weight2 = pull(rear, rig.gravity) * np.cos(theta2 + rig.slope)
     rows = np.array(
         [
             [zero, one, zero, zero, zero],
-            np.array([weight1, zero, zero, zero, zero]) - (pull * by_p1 + p1 * by_pull) / (m1 * l1),
+            np.array([weight1, zero, zero, zero, zero]) - (tension * by_p1 + p1 * by_pull) * (l1 / inertia(front)),
             [zero, zero, zero, one, zero],
-            np.array([zero, zero, weight2, zero, zero]) + (pull * by_p2 + p2 * by_pull) / (m2 * l2),
+            np.array([zero, zero, weight2, zero, zero]) + (tension * by_p2 + p2 * by_pull) * (l2 / inertia(rear)),
             [zero, zero, zero, zero, zero],
         ]
     )
@@ -103,7 +102,7 @@ def jump(rig: RigParams, before: Segment, after: Segment, external_force: float 
     for i, wheel in enumerate((rig.front, rig.rear)):
         direction = after.steps[i] - before.steps[i]
         if direction:
-            _, matrix[2 * i + 1, 2 * i + 1] = reset(wheel.alpha, 1.0, direction)
+            _, matrix[2 * i + 1, 2 * i + 1] = reset(wheel.alpha, kept(wheel), 1.0, direction)
             matrix[:, 2 * i] += (f_after - matrix @ f_before) / f_before[2 * i]
     return matrix
 

@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from dcdrw_msgs_py.quantity import check
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
-from dcdrw_sim.model.dynamics import State, gentlest_slope, limit_cycle_speed
+from dcdrw_sim.model.dynamics import State
+from dcdrw_sim.model.wheel import gentlest_slope, kept, limit_cycle_speed
 
 
 class Start(NamedTuple):
@@ -63,7 +64,7 @@ def starts(rig: RigParams, phases: ArrayLike, speeds: ArrayLike = 1.0) -> NDArra
     front, rear = rig.front, rig.rear
     phase, speed = np.broadcast_arrays(np.asarray(phases, float), np.asarray(speeds, float))
     theta2 = rear.alpha * (1.0 - 2.0 * phase)
-    omega1 = limit_cycle_speed(front, rig.slope, rig.gravity) / math.cos(2.0 * front.alpha)
+    omega1 = limit_cycle_speed(front, rig.slope, rig.gravity) / kept(front)
     omega2 = limit_cycle_speed(rear, rig.slope, rig.gravity, theta2)
     return np.stack([np.full_like(theta2, front.alpha), omega1 * speed, theta2, omega2 * speed], axis=-1)
 

@@ -15,6 +15,9 @@ from dcdrw_sim.motion.trajectory import Run
 DEFAULT_STRIKES = 20
 """Strikes of a case that lists none."""
 
+Json = Any  # as `json` reads it
+Record = dict[str, Json]
+
 _NUMBERS = ('g', 'slope', 'k', 'b', 'D0', 'S0')
 _PAIRS = ('l', 'm', 'alpha')
 _BESIDE = ('case', 'strikes', 'end')
@@ -28,7 +31,7 @@ class Case(NamedTuple):
     state: State
     listed_strikes: int
     """How many strikes the file lists; DEFAULT_STRIKES where it lists none."""
-    raw: dict[str, Any]
+    raw: Record
     """The `case` object as it was read."""
 
 
@@ -54,7 +57,7 @@ def read_cases(path: Path) -> tuple[list[Case], bool]:
     return [_parse(entry, f'{path}, case {index}') for index, entry in enumerate(entries)], isinstance(content, list)
 
 
-def _parse(entry: Any, where: str) -> Case:
+def _parse(entry: Json, where: str) -> Case:
     raw = entry.get('case', entry) if isinstance(entry, dict) else None
     if not isinstance(raw, dict):
         raise ValueError(f'{where}: must be an object with the keys {", ".join((*_NUMBERS, *_PAIRS, "x0"))}')
@@ -66,12 +69,15 @@ def _parse(entry: Any, where: str) -> Case:
     name = str(raw.get('name', 'case'))
     where = f'{where} ({name})' if 'name' in raw else where
     g, slope, k, b, D0, S0 = (_numbers(raw, key, where)[0] for key in _NUMBERS)
-    length, mass, alpha = (_numbers(raw, key, where, 2) for key in _PAIRS)
-    for angle in alpha:
+    lengths, masses, alphas = (_numbers(raw, key, where, 2) for key in _PAIRS)
+    for angle in alphas:
         if not 0.0 < angle <= math.pi / 4:
             raise ValueError(f'{where}: alpha must be in (0, π/4] rad, got {angle}')
-    front, rear = (WheelParams(*values) for values in zip(length, mass, (math.pi / a for a in alpha), strict=True))
-    rig = RigParams(front, rear, k, b, D0, S0, slope, g)
+    front, rear = (
+        WheelParams(length=length, mass=mass, spokes=math.pi / alpha)
+        for length, mass, alpha in zip(lengths, masses, alphas, strict=True)
+    )
+    rig = RigParams(front=front, rear=rear, k=k, b=b, D0=D0, S0=S0, slope=slope, gravity=g)
     state = State(*_numbers(raw, 'x0', where, 4))
     try:
         Simulation(rig, state)
@@ -81,7 +87,7 @@ def _parse(entry: Any, where: str) -> Case:
     return Case(name, rig, state, len(strikes) if isinstance(strikes, list) and strikes else DEFAULT_STRIKES, raw)
 
 
-def _numbers(raw: dict[str, Any], key: str, where: str, count: int = 1) -> list[float]:
+def _numbers(raw: Record, key: str, where: str, count: int = 1) -> list[float]:
     if key not in raw:
         raise ValueError(f'{where}: {key} is missing')
     values = raw[key] if count > 1 else [raw[key]]
@@ -91,19 +97,19 @@ def _numbers(raw: dict[str, Any], key: str, where: str, count: int = 1) -> list[
     return [float(value) for value in values]
 
 
-def _is_number(value: Any) -> bool:
+def _is_number(value: Json) -> bool:
     try:
         return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
     except OverflowError:  # a whole number beyond every float
         return False
 
 
-def strike_record(strike: Strike) -> dict[str, Any]:
+def strike_record(strike: Strike) -> Record:
     """One strike as the file holds it."""
     return {'wheel': strike.wheel, 't': strike.t, 'state': [float(value) for value in strike.state]}
 
 
-def run_record(case: Case, run: Run) -> dict[str, Any]:
+def run_record(case: Case, run: Run) -> Record:
     """One case with its strikes and why it ended, in the format of the file that it came from."""
     end = {'reason': run.end.name.lower(), 'meaning': run.reason, 't': run.duration}
     return {'case': case.raw, 'strikes': [strike_record(strike) for strike in run.strikes], 'end': end}

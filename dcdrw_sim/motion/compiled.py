@@ -1,15 +1,14 @@
 """Compilation by numba where it is installed; without it everything runs as plain Python, only slower."""
 
-import hashlib
 from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
 from typing import Any, TypeVar
 
 from dcdrw_sim.model import dynamics
-from dcdrw_sim.motion import ends, events, taylor
+from dcdrw_sim.motion import events, taylor
+from dcdrw_sim.source import fingerprint
 
-Function = TypeVar('Function', bound=Callable[..., Any])
+Function = TypeVar('Function', bound=Callable[..., Any])  # whatever it takes
 
 try:
     from numba import njit
@@ -20,14 +19,17 @@ except ImportError:
     AVAILABLE = False
 
 # Contraction to fused multiply-add is the only liberty taken: every lane gets the same result as every other.
-_OPTIONS: dict[str, Any] = {'error_model': 'numpy', 'fastmath': {'contract'}}
+_OPTIONS: dict[str, Any] = {  # as numba's decorators take them
+    'error_model': 'numpy',
+    'fastmath': {'contract'},
+}
 
 
 def compiled(function: Function) -> Function:
     """The function compiled to machine code, or itself where numba is missing."""
     if not AVAILABLE:
         return function
-    # numba's cache watches only the function's own file: let its name there tell of the others too.
+    # numba's cache watches only the function's own file: let its name tell of all that it calls and freezes.
     function.__qualname__ += f'_{_FINGERPRINT}'
     kernel: Function = njit(nogil=True, **_OPTIONS)(function)  # threads run side by side
     with suppress(RuntimeError):  # nowhere to keep it: it is compiled anew at every start
@@ -36,11 +38,9 @@ def compiled(function: Function) -> Function:
 
 
 if AVAILABLE:
-    from dcdrw_sim.motion import lanes
+    from dcdrw_sim.motion import lanes  # noqa: F401  # registers the vectors
 
-    _FINGERPRINT = hashlib.sha256(
-        b''.join(Path(module.__file__ or '').read_bytes() for module in (dynamics, ends, events, taylor, lanes))
-    ).hexdigest()[:16]
+    _FINGERPRINT = fingerprint('dcdrw_msgs_py', 'dcdrw_sim.model', 'dcdrw_sim.motion')
 
     for _function in (
         taylor.sin_series,

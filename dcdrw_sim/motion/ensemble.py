@@ -1,15 +1,18 @@
 """Many pairs at once: trajectories side by side in the lanes of the Taylor kernel, compiled where numba is."""
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dcdrw_msgs_py.quantity import fields, lookup
-from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelParams
+from dcdrw_msgs_py.quantity import lookup
+from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
+from dcdrw_msgs_py.rolling import default_rest_length, default_stance_distance
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.model.dynamics import reset
+from dcdrw_sim.model.rigs import FIELDS, Rigs, Wheels, rig_at
 from dcdrw_sim.motion import taylor
 from dcdrw_sim.motion.compiled import compiled
 from dcdrw_sim.motion.ends import (
@@ -34,6 +37,8 @@ from dcdrw_sim.motion.taylor import (
     OMEGA2,
     THETA1,
     THETA2,
+    Row,
+    Table,
     bare,
     expand,
     minimum,
@@ -43,17 +48,12 @@ from dcdrw_sim.motion.taylor import (
     work_parameters,
 )
 
-Floats = NDArray[np.float64]
-Rigs = Any
-"""The rigs of N pairs in one: a `RigParams` in which every parameter is an array of shape (N,)."""
-
 TOLERANCE = 5e-16
 """Last term of the angles' series at the end of a step [rad]: strikes within 1e-9 over 100 time units."""
 
 STRIKE = np.dtype([('wheel', np.int8), ('direction', np.int8), ('t', float), ('state', float, (4,))])
 """One strike: wheel 1 or 2, direction, time [s], and the state just before it."""
 
-_FIELDS = tuple(fields(RigParams))
 STATE = (THETA1, OMEGA1, THETA2, OMEGA2)
 # Plain numbers, which compile.
 TOO_FAST, NONE_YET, NO_PAIR = -2, -1, -1
@@ -98,7 +98,7 @@ CONVERGED = 1e-7
 class Ensemble(NamedTuple):
     """What became of each of N pairs."""
 
-    strikes: NDArray[Any]
+    strikes: NDArray[np.void]
     """dtype STRIKE, shape (N, capacity); each row is filled up to its count."""
     counts: NDArray[np.int64]
     """Strikes of each pair, shape (N,)."""
@@ -191,8 +191,8 @@ def spread(rig: RigParams, count: int, columns: Mapping[str, ArrayLike]) -> Rigs
         ValueError: an unknown name, another shape, or an impossible parameter, as `accept`.
 
     """
-    common = {field.name: lookup(rig, field.name) for field in _FIELDS}
-    values: dict[str, Any] = {}
+    common = {field.name: lookup(rig, field.name) for field in FIELDS}
+    values: dict[str, Floats] = {}
     if unknown := set(columns) - set(common):
         raise ValueError(f'{", ".join(sorted(unknown))} is no parameter of a rig; known are {", ".join(common)}')
     for name, shared in common.items():
@@ -200,53 +200,33 @@ def spread(rig: RigParams, count: int, columns: Mapping[str, ArrayLike]) -> Rigs
         if value.shape not in ((), (count,)):
             raise ValueError(f'{name} must be a scalar or of shape ({count},), got {value.shape}')
         values[name] = np.broadcast_to(value, (count,))
-    front, rear = (WheelParams(*(values[f'{side}.{name}'] for name in WheelParams._fields)) for side in (FRONT, REAR))
-    # As `RigParams.resolved`.
-    values['S0'] = np.where(np.isnan(values['S0']), front.length, values['S0'])
-    at_rest = np.maximum(values['S0'] + front.length * each(math.sin, front.alpha), 0.0)
-    values['D0'] = np.where(np.isnan(values['D0']), at_rest, values['D0'])
-    rigs = RigParams(front, rear, *(values[name] for name in RigParams._fields[2:]))
+    front, rear = (Wheels(**{name: values.pop(f'{side}.{name}') for name in Wheels._fields}) for side in (FRONT, REAR))
+    values['S0'] = default_stance_distance(values['S0'], front.length)
+    values['D0'] = default_rest_length(values['D0'], values['S0'], front.length, front.alpha)
+    rigs = Rigs(front=front, rear=rear, **values)
     if count:
         _check(rigs)
     return rigs
 
 
-def take(rigs: Rigs, which: Any) -> Rigs:
-    """Some of the rigs of `spread`, by an array of indices; one of them by a number."""
-    front, rear = (WheelParams(*(value[which] for value in wheel)) for wheel in (rigs.front, rigs.rear))
-    return RigParams(front, rear, *(value[which] for value in rigs[2:]))
-
-
-def each(function: Callable[[float], float], values: Any) -> Floats:
-    """A function of `math` of every value: numpy's own may round the same number in two ways, by its place."""
-    return np.fromiter(map(function, values.tolist()), float, len(values))
-
-
 def _check(rigs: Rigs) -> None:
     """Refuse all pairs for one that `accept` refuses: one at the end of a column, or the stiffest."""
-    for field in _FIELDS:
+    for field in FIELDS:
         column = lookup(rigs, field.name)
         for index in (int(np.argmin(column)), int(np.argmax(column))):
             if not field.quantity.allows(float(column[index])):
-                accept(take(rigs, index))
+                accept(rig_at(rigs, index))
     mass = 1.0 / (1.0 / rigs.front.mass + 1.0 / rigs.rear.mass)
     fastest = STIFFEST * np.sqrt(rigs.gravity / rigs.front.length)
     for stiffness in (rigs.k / (mass * fastest**2), rigs.b / (mass * fastest)):
         if stiffness.max() > 1.0:
-            accept(take(rigs, int(np.argmax(stiffness))))
+            accept(rig_at(rigs, int(np.argmax(stiffness))))
 
 
 def _parameters(rigs: Rigs) -> Floats:
     """Parameter rows of each pair, shape (N, PARAMETERS), in the order of the work array."""
-    rows: Any = {}
-    work_parameters(rows, 0, rigs._replace(slope=0.0))
-    rows |= {
-        taylor.S: rigs.S0,
-        taylor.COS_SLOPE: each(math.cos, rigs.slope),
-        taylor.SIN_SLOPE: each(math.sin, rigs.slope),
-    }
     parameters = np.empty((len(rigs.k), taylor.PARAMETERS))
-    for row, value in rows.items():
+    for row, value in {**work_parameters(rigs), taylor.S: rigs.S0}.items():
         parameters[:, _column(row)] = value
     return parameters
 
@@ -263,7 +243,7 @@ def _aligned(size: int) -> Floats:
 
 
 @compiled
-def _guess_strike(start: Any, rate: Any, end: Any, end_rate: Any, aim: Any, step: Any) -> Any:
+def _guess_strike(start: Row, rate: Row, end: Row, end_rate: Row, aim: Row, step: Row) -> Row:
     """When a wheel comes to an angle, were time a cubic of its angle: exact at both ends of the step."""
     part = (aim - start) / (end - start)
     rest = 1.0 - part
@@ -271,7 +251,7 @@ def _guess_strike(start: Any, rate: Any, end: Any, end_rate: Any, aim: Any, step
 
 
 @compiled
-def _find_strikes(work: Any) -> None:
+def _find_strikes(work: Table) -> None:
     """When each wheel strikes if it rolls forward throughout its step; the step's end if it does not strike.
 
     Newton's method, which aims at the strike or at where the step ends, whichever is nearer.
@@ -292,7 +272,7 @@ def _find_strikes(work: Any) -> None:
 
 
 @compiled
-def _cut_steps(w: Any) -> None:
+def _cut_steps(w: Table) -> None:
     """End each lane's step at its first strike; set which wheel strikes (0: none), and which way."""
     _find_strikes(w)
     for l in range(LANES):
@@ -309,7 +289,7 @@ def _cut_steps(w: Any) -> None:
 
 
 @compiled
-def _acceleration(w: Any, l: int, i: int, theta: float, S: float) -> Any:
+def _acceleration(w: Table, l: int, i: int, theta: float, S: float) -> Row:
     """The acceleration of wheel i were it at rest at an angle and a stance distance."""
     l1, l2 = w[taylor.L1 + l], w[taylor.L2 + l]
     theta1, theta2 = (theta, w[THETA2 + l]) if i == 0 else (w[THETA1 + l], theta)
@@ -325,7 +305,7 @@ def _acceleration(w: Any, l: int, i: int, theta: float, S: float) -> Any:
 
 
 @compiled
-def _rest(w: Any, l: int, i: int) -> Any:
+def _rest(w: Table, l: int, i: int) -> bool:
     """Whether wheel i, at rest on two spokes, stays so; else it is let go over the one it is pushed over.
 
     As `Simulation`, to the same end: see `dcdrw_sim.model.dynamics.tipping`.
@@ -346,12 +326,12 @@ def _rest(w: Any, l: int, i: int) -> Any:
 
 
 @compiled
-def _stance_distance(w: Any, l: int) -> Any:
+def _stance_distance(w: Table, l: int) -> Row:
     return w[S0 + l] + w[STEPS1 + l] * w[STRIDE1 + l] + w[STEPS2 + l] * w[STRIDE2 + l]
 
 
 @compiled
-def _load(w: Any, l: int, parameters: Any, start: Any) -> Any:
+def _load(w: Table, l: int, parameters: Floats, start: Floats) -> bool:
     """Put a pair at its start into a lane; whether a wheel stands there."""
     for row in range(taylor.PARAMETERS):
         w[taylor.FIRST_PARAMETER + row * LANES + l] = parameters[row]
@@ -372,7 +352,7 @@ def _load(w: Any, l: int, parameters: Any, start: Any) -> Any:
 
 
 @compiled
-def _record(w: Any, l: int, i: int, direction: int, record: Any) -> None:
+def _record(w: Table, l: int, i: int, direction: int, record: NDArray[np.void]) -> None:
     """Note a strike of wheel i, its angle exactly on its guard."""
     w[STATE[2 * i] + l] = direction * w[taylor.ALPHA1 + i * LANES + l]
     record['wheel'], record['direction'], record['t'] = i + 1, direction, w[TIME + l]
@@ -381,10 +361,10 @@ def _record(w: Any, l: int, i: int, direction: int, record: Any) -> None:
 
 
 @compiled
-def _strike(w: Any, l: int, i: int, direction: int) -> int:
+def _strike(w: Table, l: int, i: int, direction: int) -> int:
     """Put wheel i on its next spoke; how the run ends with that, if it does."""
     theta, omega, row = STATE[2 * i] + l, STATE[2 * i + 1] + l, i * LANES + l
-    w[theta], w[omega] = reset(w[taylor.ALPHA1 + row], w[omega], direction)
+    w[theta], w[omega] = reset(w[taylor.ALPHA1 + row], w[taylor.KEPT1 + row], w[omega], direction)
     w[STEPS1 + row] += direction
     fallen = direction == BACKWARD and w[ROLLED1 + row] == BACKWARD
     w[LAST1 + row], w[ROLLED1 + row] = w[TIME + l], direction
@@ -395,15 +375,15 @@ def _strike(w: Any, l: int, i: int, direction: int) -> int:
 
 @compiled
 def _run(
-    work: Any,
-    parameters: Any,
-    starts: Any,
+    work: Floats,
+    parameters: Floats,
+    starts: Floats,
     seconds: float,
     tolerance: float,
-    records: Any,
-    counts: Any,
-    ends: Any,
-    durations: Any,
+    records: NDArray[np.void],
+    counts: NDArray[np.int64],
+    ends: NDArray[np.int64],
+    durations: Floats,
 ) -> None:
     """Run every pair: each lane takes the next one when its own has ended, and never waits for another."""
     w, lanes = bare(work), rows(bare(work), LANES)

@@ -2,7 +2,7 @@
 
 import math
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import polynomial
@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 
 from dcdrw_msgs_py.quantity import check
 from dcdrw_msgs_py.rig import RigParams, WheelParams
+from dcdrw_msgs_py.rolling import rotation
+from dcdrw_msgs_py.values import Real
 from dcdrw_sim.model.dynamics import State, coupler, coupler_force, hub_distance, reset, stance_distance, tipping
+from dcdrw_sim.model.wheel import kept
 from dcdrw_sim.motion import taylor
 from dcdrw_sim.motion.ends import (
     LEAST_TIME,
@@ -51,12 +54,12 @@ class Segment(NamedTuple):
     steps: tuple[int, int]
     """n1, n2 throughout the segment."""
 
-    def at(self, times: Any) -> State:
+    def at(self, times: Real) -> State:
         """The state at a time or an array of times [s]."""
         t = np.asarray(times) - self.start
         return State(
             *(
-                polynomial.polyval(t, series)
+                np.asarray(polynomial.polyval(t, series), float)
                 for theta in (self.theta1, self.theta2)
                 for series in (theta, polynomial.polyder(theta))
             )
@@ -115,7 +118,8 @@ class Simulation:
         for name, value in zip(State._fields, state, strict=True):
             if not math.isfinite(value):
                 raise ValueError(f'{name} of the start must be finite, got {value}')
-        for name, theta, wheel in (('theta1', state.theta1, self._rig.front), ('theta2', state.theta2, self._rig.rear)):
+        theta1, omega1, theta2, omega2 = map(float, state)
+        for name, theta, wheel in (('theta1', theta1, self._rig.front), ('theta2', theta2, self._rig.rear)):
             if abs(theta) > wheel.alpha * (1 + 1e-12):
                 raise ValueError(f'{name} of the start must be within ±α = ±{wheel.alpha:.6g} rad, got {theta:g}')
         self.time = 0.0
@@ -135,8 +139,8 @@ class Simulation:
         self._write_state(state)
         self._write_parameters()
         self._require_length()
-        for i, wheel in enumerate(self._wheels):
-            if state[2 * i + 1] == 0.0 and abs(state[2 * i]) >= wheel.alpha:
+        for i, (theta, omega) in enumerate(((theta1, omega1), (theta2, omega2))):
+            if omega == 0.0 and abs(theta) >= self._wheels[i].alpha:
                 self._rest(i)
 
     @property
@@ -223,13 +227,13 @@ class Simulation:
         spring = coupler(rig, state, self.stance_distance)
         return Motion(
             self.time,
-            state.theta1 + 2.0 * rig.front.alpha * self.steps[0],
-            state.omega1,
-            state.theta2 + 2.0 * rig.rear.alpha * self.steps[1],
-            state.omega2,
-            spring.length,
-            spring.rate,
-            coupler_force(rig, spring.length, spring.rate) + self._force,
+            float(rotation(rig.front.alpha, self.steps[0], state.theta1)),
+            float(state.omega1),
+            float(rotation(rig.rear.alpha, self.steps[1], state.theta2)),
+            float(state.omega2),
+            float(spring.length),
+            float(spring.rate),
+            float(coupler_force(rig, spring.length, spring.rate)) + self._force,
             tuple(strikes),
         )
 
@@ -308,7 +312,7 @@ class Simulation:
 
     def _strike(self, i: int, direction: int) -> None:
         w, wheel = self._work, self._wheels[i]
-        w[_THETA[i]], w[_OMEGA[i]] = reset(wheel.alpha, w[_OMEGA[i]], direction)
+        w[_THETA[i]], w[_OMEGA[i]] = reset(wheel.alpha, kept(wheel), w[_OMEGA[i]], direction)
         self.steps[i] += direction
         self.last_strike[i] = self.time
         if abs(w[_OMEGA[i]]) < self._speed(i, STANDING_SPEED):
@@ -360,8 +364,9 @@ class Simulation:
         w[taylor.THETA1], w[taylor.OMEGA1], w[taylor.THETA2], w[taylor.OMEGA2] = map(float, state)
 
     def _write_parameters(self) -> None:
-        taylor.work_parameters(self._work, 0, self._rig, self._force)
-        self._work[taylor.S] = stance_distance(self._rig, *self.steps)
+        for row, value in taylor.work_parameters(self._rig, self._force).items():
+            self._work[row] = float(value)
+        self._work[taylor.S] = float(stance_distance(self._rig, *self.steps))
         for i in (0, 1):
             self._work[_FREE[i]] = 0.0 if self.standing[i] else 1.0
 

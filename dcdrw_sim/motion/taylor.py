@@ -24,11 +24,15 @@ from operator import mul
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.values import Floats, Real, each
+from dcdrw_sim.model.rigs import Rigs
+from dcdrw_sim.model.wheel import inertia, kept, pull
 
 Work = MutableSequence[float]
+Row = Any  # a number, an array of a number each lane or, compiled, a vector: what the caller's work array holds
+Table = Any  # a work array: a list, an array or, compiled, a pointer
 
 LANES = 16
 """Pairs side by side: two AVX-512 or four AVX2 registers."""
@@ -63,8 +67,10 @@ _SERIES = (ORDER + 1) * LANES
     FREE2,
     ALPHA1,
     ALPHA2,
+    KEPT1,
+    KEPT2,
     END,
-) = range(15 * _SERIES, 15 * _SERIES + 24 * LANES, LANES)
+) = range(15 * _SERIES, 15 * _SERIES + 26 * LANES, LANES)
 FIRST_PARAMETER, PARAMETERS = G1, (END - G1) // LANES
 """Where the parameters begin, and how many there are."""
 
@@ -86,31 +92,32 @@ _SIN = tuple(1.0 / ((2 * j) * (2 * j + 1)) for j in range(9, 0, -1))
 _COS = tuple(1.0 / ((2 * j - 1) * (2 * j)) for j in range(9, 0, -1))
 
 
-def work_parameters(w: Work, l: int, rig: RigParams, external_force: float = 0.0) -> None:
-    """Write a rig's parameters into lane l of a work array."""
+def work_parameters(rig: RigParams | Rigs, external_force: float = 0.0) -> dict[int, Real]:
+    """What the rows of the work array that hold parameters are, for one rig or for N, but S."""
     front, rear = rig.front, rig.rear
-    for row, value in (
-        (G1, rig.gravity / front.length),
-        (G2, rig.gravity / rear.length),
-        (COS_SLOPE, math.cos(rig.slope)),
-        (SIN_SLOPE, math.sin(rig.slope)),
-        (L1, front.length),
-        (L2, rear.length),
-        (INV_ML1, 1.0 / (front.mass * front.length)),
-        (INV_ML2, 1.0 / (rear.mass * rear.length)),
-        (K, rig.k),
-        (B, rig.b),
-        (D0, rig.D0),
-        (FORCE, external_force),
-        (ALPHA1, front.alpha),
-        (ALPHA2, rear.alpha),
-        (FREE1, 1.0),
-        (FREE2, 1.0),
-    ):
-        w[row + l] = value
+    return {
+        G1: pull(front, rig.gravity),
+        G2: pull(rear, rig.gravity),
+        COS_SLOPE: each(math.cos, rig.slope),
+        SIN_SLOPE: each(math.sin, rig.slope),
+        L1: front.length,
+        L2: rear.length,
+        INV_ML1: front.length / inertia(front),
+        INV_ML2: rear.length / inertia(rear),
+        K: rig.k,
+        B: rig.b,
+        D0: rig.D0,
+        FORCE: external_force,
+        ALPHA1: front.alpha,
+        ALPHA2: rear.alpha,
+        KEPT1: kept(front),
+        KEPT2: kept(rear),
+        FREE1: 1.0,
+        FREE2: 1.0,
+    }
 
 
-def rows(w: Any, lanes: int) -> Any:
+def rows(w: Table, lanes: int) -> Table:
     """A view of a work array in which ``[X]`` is one value: a number for one lane, else an array for all.
 
     Compiled, that array is a vector (`dcdrw_sim.motion.lanes`).
@@ -118,39 +125,39 @@ def rows(w: Any, lanes: int) -> Any:
     return w if lanes == 1 else _Rows(w)
 
 
-def bare(w: Any) -> Any:
+def bare(w: Table) -> Table:
     """The work array; compiled, a bare pointer to it, free of bookkeeping."""
     return w
 
 
 class _Rows:
-    def __init__(self, w: NDArray[np.float64]) -> None:
+    def __init__(self, w: Floats) -> None:
         self._rows = w.reshape(-1, LANES)
 
-    def __getitem__(self, at: Any) -> NDArray[np.float64]:
+    def __getitem__(self, at: int | slice) -> Floats:
         return self._rows[at // LANES if isinstance(at, int) else slice(at.start // LANES, (at.stop - 1) // LANES + 1)]
 
-    def __setitem__(self, at: int, row: Any) -> None:
+    def __setitem__(self, at: int, row: Row) -> None:
         self._rows[at // LANES] = row
 
 
-def convolve(w: Any, products: tuple[Product, ...], n: int) -> None:
+def convolve(w: Table, products: tuple[Product, ...], n: int) -> None:
     """Store the n-th coefficient of each product of two series, Σ_{j=0}^{n} a_j b_{n−j}; zero for n = −1."""
     for out, a, b in products:
         w[out] = sum(map(mul, w[a : a + n * LANES + 1 : LANES], w[b : b + n * LANES + 1 : LANES][::-1]), 0.0)
 
 
-def sqrt(x: Any) -> Any:
+def sqrt(x: Row) -> Row:
     """The square root of a number or a row."""
     return x**0.5
 
 
-def minimum(x: Any, y: Any) -> Any:
+def minimum(x: Row, y: Row) -> Row:
     """The smaller of two numbers or, lane by lane, of two rows."""
     return np.minimum(x, y)
 
 
-def sin_series(x: Any) -> Any:
+def sin_series(x: Row) -> Row:
     """Sine of |x| ≤ π/4, of a number or a row, to rounding."""
     y = x * x
     total = 1.0 - y * _SIN[0]
@@ -159,7 +166,7 @@ def sin_series(x: Any) -> Any:
     return x * total
 
 
-def cos_series(x: Any) -> Any:
+def cos_series(x: Row) -> Row:
     """Cosine of |x| ≤ π/4, of a number or a row, to rounding."""
     y = x * x
     total = 1.0 - y * _COS[0]
@@ -168,7 +175,7 @@ def cos_series(x: Any) -> Any:
     return total
 
 
-def expand(work: Any, lanes: int) -> None:
+def expand(work: Table, lanes: int) -> None:
     """Expand the motion about the state: fill the series from coefficient 0 of the angles and speeds.
 
     Args:
@@ -209,7 +216,7 @@ def expand(work: Any, lanes: int) -> None:
         w[OMEGA1 + following], w[OMEGA2 + following], w[OMEGA + following] = omega1, omega2, omega1 - omega2
 
 
-def motion(w: Any, t1: Any, t2: Any) -> tuple[Any, Any, Any, Any]:
+def motion(w: Table, t1: Row, t2: Row) -> tuple[Row, Row, Row, Row]:
     """θ1, ω1 at a time t1 from the start of the series, θ2, ω2 at t2; of a number or a row."""
     top = ORDER * LANES
     theta1, omega1, theta2, omega2 = w[THETA1 + top], w[OMEGA1 + top], w[THETA2 + top], w[OMEGA2 + top]

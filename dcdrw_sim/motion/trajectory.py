@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
+from dcdrw_msgs_py.rolling import rotation
 from dcdrw_sim.model.dynamics import State, coupler, coupler_force, stance_distance
 from dcdrw_sim.motion.ends import BACKWARD, NONE, STALL_TIME, End, HubsMetError, Strike
 from dcdrw_sim.motion.pair import Segment, Simulation
@@ -80,17 +81,18 @@ class Run(NamedTuple):
             steps[:, inside] = np.reshape(self.segments[index].steps, (2, 1))
         state, (steps1, steps2) = State(*motion), steps
         spring = coupler(self.rig, state, stance_distance(self.rig, steps1, steps2))
-        return Trajectory(
+        columns = (
             t,
             *state,
-            state.theta1 + 2 * self.rig.front.alpha * steps1,
-            state.theta2 + 2 * self.rig.rear.alpha * steps2,
+            rotation(self.rig.front.alpha, steps1, state.theta1),
+            rotation(self.rig.rear.alpha, steps2, state.theta2),
             steps1,
             steps2,
             spring.length,
             spring.rate,
             coupler_force(self.rig, spring.length, spring.rate),
         )
+        return Trajectory(*map(np.asarray, columns))
 
 
 def run(

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
+from dcdrw_msgs_py.rolling import speed_kept
 from dcdrw_sim.map.return_map import Complexes, spectrum
 
 Floats = NDArray[np.float64]
@@ -122,7 +123,7 @@ def _solve(alpha: float, k: float, b: float, period: float) -> tuple[Floats, Flo
     """The start of half a step and its flow, both linear in [ω, θ, ω′, γ, 1], and [ω, θ, ω′, γ] of the gait."""
     flow = _flow(alpha, k, b, 0.5 * period)
     start, end = np.zeros((6, 5)), np.zeros((4, 5))
-    start[0, 4], start[1, 0], start[2, 1], start[3, 2] = -alpha, math.cos(2.0 * alpha), 1.0, 1.0
+    start[0, 4], start[1, 0], start[2, 1], start[3, 2] = -alpha, speed_kept(alpha), 1.0, 1.0
     start[4, 3] = start[5, 4] = 1.0
     end[0, 1] = end[1, 2] = end[3, 0] = 1.0
     end[2, 4] = alpha

@@ -23,7 +23,8 @@ from scipy.optimize import brentq, minimize_scalar
 
 from dcdrw_msgs_py.quantity import check
 from dcdrw_msgs_py.rig import RigParams
-from dcdrw_sim.model.dynamics import State, coupler, kinetic_energy
+from dcdrw_sim.model.dynamics import State, coupler
+from dcdrw_sim.model.wheel import kinetic_energy
 
 STEEPEST = math.pi / 4
 """Steepest slope of a rig [rad]."""
@@ -149,8 +150,9 @@ class RigidPair:
         """The state at these angles with that kinetic energy [J], rolling downhill."""
         front, rear = self.rig.front, self.rig.rear
         levers = coupler(self.rig, State(theta1, 0.0, theta2, 0.0), S)
-        self._possible(min(levers.p1, levers.p2))
-        omega1, omega2 = rear.length * levers.p2, front.length * levers.p1  # Ḋ = 0: ℓ1 p1 θ̇1 = ℓ2 p2 θ̇2
+        p1, p2 = float(levers.p1), float(levers.p2)
+        self._possible(min(p1, p2))
+        omega1, omega2 = rear.length * p2, front.length * p1  # Ḋ = 0: ℓ1 p1 θ̇1 = ℓ2 p2 θ̇2
         scale = math.sqrt(energy / (kinetic_energy(front, omega1) + kinetic_energy(rear, omega2)))
         return State(theta1, scale * omega1, theta2, scale * omega2)
 
@@ -171,8 +173,8 @@ class RigidPair:
         front, rear = self.rig.front, self.rig.rear
         S_after = S + struck[0] * front.step_length - struck[1] * rear.step_length
         allowed = self.state(
-            -front.alpha if struck[0] else before.theta1,
-            -rear.alpha if struck[1] else before.theta2,
+            -front.alpha if struck[0] else float(before.theta1),
+            -rear.alpha if struck[1] else float(before.theta2),
             S_after,
             self.kinetic_energy(before),
         )

@@ -2,7 +2,7 @@
 
 A point mass at the hub, massless spokes, a strike that keeps the angular momentum about the new stance foot. The
 square of the speed just after a strike, ω₊², then follows an affine map, and everything else follows from that.
-The limit cycle's speed and the gentlest slope are in `dcdrw_sim.model.dynamics`.
+The limit cycle's speed and the gentlest slope are in `dcdrw_sim.model.wheel`.
 Slopes γ ≥ 0; a negative one is a mirror.
 """
 
@@ -12,7 +12,7 @@ from enum import Enum
 from scipy.special import ellipkinc
 
 from dcdrw_msgs_py.rig import WheelParams
-from dcdrw_sim.model.dynamics import gentlest_slope, limit_cycle_speed
+from dcdrw_sim.model.wheel import gentlest_slope, kept, limit_cycle_speed, pull
 
 
 class Fate(Enum):
@@ -23,13 +23,13 @@ class Fate(Enum):
 
 
 def multiplier(wheel: WheelParams) -> float:
-    """cos²(2α): what a strike leaves of ω², and a step of a small deviation from the limit cycle."""
-    return math.cos(2.0 * wheel.alpha) ** 2
+    """η², η = cos 2α: what a strike leaves of ω², and a step of a small deviation from the limit cycle."""
+    return kept(wheel) ** 2
 
 
 def slope_gain(wheel: WheelParams, slope: float, gravity: float) -> float:
     """What the slope adds to ω² in a step: 4 (g/ℓ) sin γ sin α [rad²/s²]."""
-    return 4.0 * gravity / wheel.length * math.sin(slope) * math.sin(wheel.alpha)
+    return 4.0 * pull(wheel, gravity) * math.sin(slope) * math.sin(wheel.alpha)
 
 
 def speed_to_pass(wheel: WheelParams, slope: float, gravity: float, theta: float) -> float:
@@ -39,7 +39,7 @@ def speed_to_pass(wheel: WheelParams, slope: float, gravity: float, theta: float
     """
     top = -min(slope, wheel.alpha)
     height = math.cos(top + slope) - math.cos(theta + slope)
-    return math.sqrt(2.0 * gravity / wheel.length * max(height, 0.0))
+    return math.sqrt(2.0 * pull(wheel, gravity) * max(height, 0.0))
 
 
 def next_speed(wheel: WheelParams, slope: float, gravity: float, omega: float) -> float:
@@ -67,16 +67,16 @@ def fate(wheel: WheelParams, slope: float, gravity: float, theta: float, omega: 
         return Fate.STANDS
     if slope >= wheel.alpha:  # nowhere to rest: the weight presses on the forward spoke only
         return Fate.ROLLS
-    kept, gain, alpha = multiplier(wheel), slope_gain(wheel, slope, gravity), wheel.alpha
+    keeps, gain, alpha = multiplier(wheel), slope_gain(wheel, slope, gravity), wheel.alpha
     passes = abs(omega) > speed_to_pass(wheel, slope, gravity, theta)
     forward = omega > 0.0 if passes else theta > -slope
     strike = alpha if forward else -alpha
-    square = omega**2 + 2.0 * gravity / wheel.length * (math.cos(theta + slope) - math.cos(strike + slope))
+    square = omega**2 + 2.0 * pull(wheel, gravity) * (math.cos(theta + slope) - math.cos(strike + slope))
     if not forward:  # uphill from spoke to spoke, until it turns back
-        square *= kept
+        square *= keeps
         while square > speed_to_pass(wheel, slope, gravity, alpha) ** 2:
-            square = kept * (square - gain)
-    rolls = math.sqrt(kept * max(square, 0.0)) > speed_to_pass(wheel, slope, gravity, -alpha)
+            square = keeps * (square - gain)
+    rolls = math.sqrt(keeps * max(square, 0.0)) > speed_to_pass(wheel, slope, gravity, -alpha)
     return Fate.ROLLS if rolls else Fate.STANDS
 
 
@@ -87,15 +87,15 @@ def uphill_bands(wheel: WheelParams, slope: float, gravity: float, count: int) -
     back too slowly to pass its apex, and stands. Empty where the slope is too gentle for a limit cycle, or for any
     band; on slopes ≥ α there are no gaps between the bands.
     """
-    kept, gain = multiplier(wheel), slope_gain(wheel, slope, gravity)
-    low = speed_to_pass(wheel, slope, gravity, -wheel.alpha) ** 2 / kept if kept else math.inf
+    keeps, gain = multiplier(wheel), slope_gain(wheel, slope, gravity)
+    low = speed_to_pass(wheel, slope, gravity, -wheel.alpha) ** 2 / keeps if keeps else math.inf
     high = speed_to_pass(wheel, slope, gravity, wheel.alpha) ** 2
     if not (slope > gentlest_slope(wheel) and low < high):
         return []
     bands = []
     for _ in range(count):
         bands.append((math.sqrt(low), math.sqrt(high)))
-        low, high = low / kept + gain, high / kept + gain
+        low, high = low / keeps + gain, high / keeps + gain
     return bands
 
 
@@ -106,7 +106,7 @@ def limit_cycle_period(wheel: WheelParams, slope: float, gravity: float) -> floa
     integral of the first kind of parameter −4 (g/ℓ)/h.
     """
     omega = float(limit_cycle_speed(wheel, slope, gravity))
-    rate2 = gravity / wheel.length
+    rate2 = pull(wheel, gravity)
     h = omega**2 - 2.0 * rate2 * (1.0 - math.cos(slope - wheel.alpha))
     if not h > 0.0:
         return math.nan
@@ -126,4 +126,4 @@ def steepest_slope(wheel: WheelParams) -> float:
     There the spoke presses with m (g cos(α + γ) − ℓ ω₋²), ω₋² = 4 (g/ℓ) sin γ sin α / sin²(2α); it vanishes at
     tan γ = cot α / (1 + 4/sin²(2α)). The model itself holds the foot down and rolls on.
     """
-    return math.atan(1.0 / (math.tan(wheel.alpha) * (1.0 + 4.0 / math.sin(2.0 * wheel.alpha) ** 2)))
+    return math.atan(1.0 / (math.tan(wheel.alpha) * (1.0 + 4.0 / (1.0 - multiplier(wheel)))))

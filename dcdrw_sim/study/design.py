@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.map.regression import PHASES
-from dcdrw_sim.model.dynamics import gentlest_slope
+from dcdrw_sim.model.rigs import Rigs, take
 from dcdrw_sim.model.start import require_rolling
-from dcdrw_sim.motion.ensemble import Rigs, spread, take
+from dcdrw_sim.model.wheel import gentlest_slope
+from dcdrw_sim.motion.ensemble import spread
 from dcdrw_sim.study.points import judge_points, run_starts, section_room, wheels_of
 from dcdrw_sim.study.verdict import Verdict, judge
 

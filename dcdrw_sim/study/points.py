@@ -12,9 +12,10 @@ from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_sim.map.limit_cycles import LimitCycles, find_limit_cycles, losses
 from dcdrw_sim.map.regression import PHASES, fit_affine, fit_raw
 from dcdrw_sim.map.return_map import Complexes, spectrum
-from dcdrw_sim.model.dynamics import limit_cycle_speed
+from dcdrw_sim.model.rigs import Rigs, rig_at, take
 from dcdrw_sim.model.start import require_rolling, starts
-from dcdrw_sim.motion.ensemble import Ensemble, Rigs, run_pairs, take
+from dcdrw_sim.model.wheel import limit_cycle_speed
+from dcdrw_sim.motion.ensemble import Ensemble, run_pairs
 from dcdrw_sim.study.verdict import BAND, Judgement, Sections, Verdict, judge
 
 Floats = NDArray[np.float64]
@@ -87,10 +88,9 @@ def section_room(rigs: Rigs, seconds: float) -> int:
 
 def wheels_of(rigs: Rigs) -> Iterator[Wheels]:
     """The wheels of every rig, with its slope and gravity."""
-    for front, rear, slope, gravity in zip(
-        zip(*rigs.front, strict=True), zip(*rigs.rear, strict=True), rigs.slope, rigs.gravity, strict=True
-    ):
-        yield WheelParams(*map(float, front)), WheelParams(*map(float, rear)), float(slope), float(gravity)
+    for index in range(len(rigs.k)):
+        rig = rig_at(rigs, index)
+        yield rig.front, rig.rear, rig.slope, rig.gravity
 
 
 def _fastest(front: WheelParams, rear: WheelParams, slope: float, gravity: float) -> float:

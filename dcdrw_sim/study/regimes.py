@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.map.limit_cycles import DIFFERENCE, find_limit_cycles, step_maps
 from dcdrw_sim.map.return_map import spectrum
+from dcdrw_sim.model.rigs import Rigs, rig_at, take
 from dcdrw_sim.model.scaling import nondimensional
-from dcdrw_sim.motion.ensemble import Rigs, run_pairs, spread, take
+from dcdrw_sim.motion.ensemble import run_pairs, spread
 from dcdrw_sim.relatives.even_gait import even_gait_on, even_stall_band, gentlest_even_gait, worst_damping
 from dcdrw_sim.study.points import ROCKING, section_room
 from dcdrw_sim.study.verdict import Judgement, Verdict, judge
@@ -74,7 +75,7 @@ def folds(rigs: Rigs, name: str, values: ArrayLike) -> Gaits:
 
     """
     values = np.asarray(values, float)
-    rigs = rigs._replace(**{name: values})
+    rigs = rigs.with_column(name, values)
     begin = find_limit_cycles(rigs, _guesses(rigs))
     here = _gaits(rigs, name, begin.periods, np.column_stack([begin.states, values]))
     rising, strides = here.tangents[:, 3] > 0.0, STRIDE * here.periods
@@ -102,7 +103,7 @@ def gentlest_slopes(rigs: Rigs) -> Gaits:
         rigs: as `folds`; their slope has no meaning.
 
     """
-    plain = [nondimensional(take(rigs, i))[0] for i in range(len(rigs.k))]
+    plain = [nondimensional(rig_at(rigs, i))[0] for i in range(len(rigs.k))]
     return folds(rigs, 'slope', [STEEP * gentlest_even_gait(rig.front.alpha, rig.k, rig.b).slope for rig in plain])
 
 
@@ -117,7 +118,7 @@ def stall_bands(rigs: Rigs) -> tuple[Gaits, Gaits]:
     """
     ends = np.empty((len(rigs.k), 2))
     for i, end in enumerate(ends):
-        rig, scales = nondimensional(take(rigs, i))
+        rig, scales = nondimensional(rig_at(rigs, i))
         low, high = even_stall_band(rig.front.alpha, rig.k, rig.slope) or FAR
         end[:] = scales.damping * low / AWAY, scales.damping * high * AWAY
     return folds(rigs, 'b', ends[:, 0]), folds(rigs, 'b', ends[:, 1])
@@ -189,7 +190,7 @@ def stall_edges(
     count, each = states.shape[:2]
 
     def walk(values: Floats) -> Bools:
-        pairs = take(rigs._replace(**{name: values}), np.repeat(np.arange(count), each))
+        pairs = take(rigs.with_column(name, values), np.repeat(np.arange(count), each))
         found = judge_starts(pairs, states.reshape(-1, 4), seconds).verdict
         return np.asarray((found <= Verdict.ELSEWHERE).reshape(count, each).all(axis=1))
 
@@ -231,7 +232,7 @@ def _linearize(rigs: Rigs, name: str, periods: Floats, unknowns: Floats, scales:
     around = unknowns + np.concatenate([np.zeros((1, 4)), np.eye(4), -np.eye(4)])[:, None] * kicks  # (9, N, 4)
     which = np.tile(np.arange(len(periods)), 9)
     states, values = around[:, :, :3].reshape(-1, 3), around[:, :, 3].ravel()
-    steps = step_maps(take(rigs, which)._replace(**{name: values}), states, np.arange(len(which)))
+    steps = step_maps(take(rigs, which).with_column(name, values), states, np.arange(len(which)))
     misses = np.column_stack([steps.states - states, steps.periods - periods[which]]).reshape(9, -1, 4)
     return misses[0], np.moveaxis((misses[1:5] - misses[5:]) / (2.0 * DIFFERENCE), 0, 2)
 
@@ -240,7 +241,7 @@ def _guesses(rigs: Rigs) -> Floats:
     """Where to search each limit cycle, shape (N, 3): at the gait of evenly spaced strikes."""
     guesses = np.empty((len(rigs.k), 3))
     for i in range(len(guesses)):
-        rig, scales = nondimensional(take(rigs, i))
+        rig, scales = nondimensional(rig_at(rigs, i))
         even = (rig.front.alpha, rig.k, rig.b)
         gait = even_gait_on(*even, rig.slope) or gentlest_even_gait(*even)
         guesses[i] = gait.omega1 / scales.time, gait.theta2, gait.omega2 / scales.time

@@ -16,9 +16,10 @@ from dcdrw_msgs_py.quantity import build, flatten
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelParams
 from dcdrw_sim.map.regression import PHASES
 from dcdrw_sim.model.presets import preset
+from dcdrw_sim.model.rigs import Rigs
 from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.motion.compiled import AVAILABLE
-from dcdrw_sim.motion.ensemble import Rigs, spread
+from dcdrw_sim.motion.ensemble import spread
 from dcdrw_sim.study.points import judge_points, section_room
 from dcdrw_sim.study.verdict import BAND
 

@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dcdrw_sim.model.rigs import Rigs
 from dcdrw_sim.motion.compiled import compiled
 from dcdrw_sim.motion.ends import BACKWARD, FORWARD
-from dcdrw_sim.motion.ensemble import FALLEN, HUBS_MET, STALLED, STANDING, TOO_FAST, Ensemble, Rigs
+from dcdrw_sim.motion.ensemble import FALLEN, HUBS_MET, STALLED, STANDING, TOO_FAST, Ensemble
 
 Floats = NDArray[np.float64]
 

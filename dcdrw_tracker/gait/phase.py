@@ -10,6 +10,7 @@ from typing import Annotated, Literal, NamedTuple, get_args
 
 from dcdrw_msgs_py.quantity import Quantity
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, StanceDistance, WheelShape
+from dcdrw_msgs_py.rolling import default_stance_distance, phase, phi_pitch, steps_ahead
 from dcdrw_msgs_py.samples import Footfall, JointSample, PhaseSample, Turn
 from dcdrw_msgs_py.topics import COUPLER, FRONT_WHEEL, REAR_WHEEL
 from dcdrw_tracker.gait.cadence import Cadence, CadenceStatus
@@ -348,14 +349,14 @@ class PhaseEstimator:
         if self._held:
             self._held = []
         front, rear = self._front, self._rear
-        pitch = front.alpha + rear.alpha
-        phi = (front.psi / front.pitch - rear.psi / rear.pitch) % 1.0 * pitch
-        phi_rate = (front.rate / front.pitch - rear.rate / rear.pitch) * pitch
+        pitch = phi_pitch(front, rear)
+        phi = phase(front, rear, front.psi, rear.psi) * pitch
+        phi_rate = steps_ahead(front, rear, front.rate, rear.rate) * pitch
         return PhaseSample(
             joints.stamp_ns + self._clock_ns,
             Turn(front.theta, front.rate),
             Turn(rear.theta, rear.rate),
-            Turn(phi if phi < pitch else 0.0, phi_rate),
+            Turn(phi, phi_rate),
             front.steps - rear.steps,
             self._restarts,
         )
@@ -488,7 +489,7 @@ class PhaseEstimator:
 
     def _footfalls(self, front: list[Strike], rear: list[Strike]) -> tuple[Footfall, ...]:
         rig = self.params
-        S0 = rig.front.length if math.isnan(rig.S0) else rig.S0  # before the strike with which a trial starts
+        S0 = default_stance_distance(rig.S0, rig.front.length)  # before the strike with which a trial starts
         clock_ns = self._clock_ns
         falls = [
             Footfall(FRONT, stamp_ns + clock_ns, S0 + (n1 + 1) * rig.front.step_length, n1) for stamp_ns, n1 in front

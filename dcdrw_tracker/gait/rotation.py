@@ -4,6 +4,8 @@ import math
 from collections import deque
 from typing import NamedTuple
 
+from dcdrw_msgs_py.rolling import stance
+
 PACE_MEMORY = 1.0
 """Time over which the mean speed is taken [s]."""
 SLOPE_WINDOW_NS = 50_000_000
@@ -68,7 +70,7 @@ class Rotation:
         self._wraps: bool | None = False if abs(angle) > math.tau + self.pitch else None
         self._past = deque([(stamp_ns, angle)])
         self._since_strike = 1
-        self._cell = self._first_cell = math.floor((angle + alpha + 0.5 * tolerance.hysteresis) / self.pitch)
+        self._cell = self._first_cell = int(stance(alpha, angle + 0.5 * tolerance.hysteresis)[0])
         self.steps = 0
         """n_i, since the start."""
         self._low, self._high = self._boundaries()

@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple
 
 from dcdrw_msgs_py.quantity import Quantity
 from dcdrw_msgs_py.rig import FRONT, REAR, WheelPitch
+from dcdrw_msgs_py.rolling import phi_pitch
 from dcdrw_msgs_py.samples import PhaseSample, SyncSample, Turn
 from dcdrw_tracker.gait.cadence import Cadence, CadenceStatus
 from dcdrw_tracker.gait.contraction import WINDOW, contraction
@@ -110,7 +111,7 @@ class SyncMonitor:
         """Take changed parameters at once."""
         self.params = params
         self._front_alpha, self._rear_alpha = params.front.alpha, params.rear.alpha
-        self._pitch = self._front_alpha + self._rear_alpha
+        self._pitch = phi_pitch(params.front, params.rear)
         self._stall_ns = params.stall_after * 1e9
 
     def reset(self) -> None:

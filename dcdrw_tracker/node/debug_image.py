@@ -11,6 +11,7 @@ from dcdrw_msgs_py.camera import Camera
 from dcdrw_msgs_py.frame import Picture
 from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.rig import FRONT, WheelShape
+from dcdrw_msgs_py.rolling import stance
 from dcdrw_msgs_py.tagging import Mount, corners, seen
 from dcdrw_tracker.node.tag_tracker import Tracked
 from dcdrw_tracker.tags.detector import Detection
@@ -73,10 +74,10 @@ def _draw_wheel(
     cv2: Any, picture: Any, wheel: _Wheel, view: WheelView, shape: WheelShape, colour: tuple[int, int, int]
 ) -> None:
     pitch = 2.0 * shape.alpha
-    stance = -pitch * math.floor((view.rotation + shape.alpha) / pitch)  # the spoke on which it stands
+    standing = -pitch * stance(shape.alpha, view.rotation)[0]  # the spoke on which it stands
     feet = [
         (-shape.length * math.sin(angle), -shape.length * math.cos(angle))
-        for angle in stance + pitch * np.arange(round(math.tau / pitch))
+        for angle in standing + pitch * np.arange(round(math.tau / pitch))
     ]
     for index, foot in reversed(list(enumerate(feet))):
         line = wheel.pixels(((0.0, 0.0), foot))
@@ -85,7 +86,7 @@ def _draw_wheel(
             cv2.line(picture, line[0].tolist(), line[1].tolist(), tint, width, cv2.LINE_AA, SHIFT)
     if (hub := wheel.pixels(((0.0, 0.0),))) is not None:
         cv2.circle(picture, hub[0].tolist(), 7 << SHIFT, colour, 2, cv2.LINE_AA, SHIFT)
-        theta = math.degrees(view.rotation + stance)
+        theta = math.degrees(view.rotation + standing)
         x, y = (hub[0] >> SHIFT).tolist()
         _write(cv2, picture, f'{theta:+.1f} deg', (x + 14, y - 60), STANCE_COLOUR)
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from dcdrw_msgs_py.rig import FRONT, REAR, WheelShape
+from dcdrw_msgs_py.rolling import stance, step_length
 from dcdrw_tracker.tags.view_plane import PlaneAxes
 from dcdrw_tracker.tags.wheel_view import PairView
 
@@ -109,8 +110,8 @@ def calibrate(views: Sequence[PairView], front: WheelShape, rear: WheelShape) ->
 
 def rolled_path(alpha: float, psi: Floats) -> Complexes:
     """Path of the hub of a wheel with ℓ = 1, from its foot at ψ = 0: downhill + 1j along the slope's normal."""
-    steps = np.floor((psi + alpha) / (2.0 * alpha))
-    return np.asarray(2.0 * math.sin(alpha) * steps + 1j * np.exp(-1j * (psi - 2.0 * alpha * steps)))
+    spoke, theta = stance(alpha, psi)
+    return np.asarray(step_length(1.0, alpha) * spoke + 1j * np.exp(-1j * theta))
 
 
 class _Path(NamedTuple):
@@ -166,7 +167,7 @@ def _calibrate(name: str, views: Sequence[PairView], shape: WheelShape) -> Wheel
     zero -= 2.0 * alpha * round((zero - float(np.angle(path.fit(alpha, zero)[0][1]))) / (2.0 * alpha))
     off = np.abs(path.fit(alpha, zero)[1])
     path = path.rows(off <= max(OUTLIER * float(np.median(off)), OUTLIER_AT_LEAST * shape.length))
-    cells = np.floor((path.psi + zero + alpha) / (2.0 * alpha))
+    cells, _ = stance(alpha, path.psi + zero)
     steps = int(np.ptp(cells))
     if steps < LEAST_STEPS:
         raise ValueError(

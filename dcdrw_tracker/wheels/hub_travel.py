@@ -1,17 +1,10 @@
 """How far a hub travels as its wheel rolls: what tells, after an occlusion, how often the wheel has turned."""
 
-import math
-
 from dcdrw_msgs_py.rig import WheelShape
+from dcdrw_msgs_py.rolling import hub_travel
 
 MEMORY = 60
 """Views over which the mean place is taken."""
-
-
-def hub_travel(shape: WheelShape, psi: float) -> float:
-    """Place of the hub along the slope, from that at ψ = 0 [m]: the feet are σ apart, the hub ℓ sin θ past its own."""
-    cell = math.floor((psi + shape.alpha) / (2.0 * shape.alpha))
-    return shape.step_length * cell + shape.length * math.sin(psi - 2.0 * shape.alpha * cell)
 
 
 class HubTravel:

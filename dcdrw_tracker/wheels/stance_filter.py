@@ -3,12 +3,11 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from dcdrw_msgs_py.rig import WheelShape
+from dcdrw_msgs_py.rolling import speed_kept, stance
+from dcdrw_msgs_py.values import Floats
 
-GRAVITY = 9.81
-"""[m/s²]"""
 LONGEST_STEP = 0.02
 """A prediction over a longer time is made in parts [s]."""
 PULL_DRIFT = 5.0
@@ -33,11 +32,12 @@ class StanceFilter:
     before a strike go on telling of the speed after it.
     """
 
-    def __init__(self, length: float, alpha: float, slope: float, psi: float, rate: float, spread: float) -> None:
-        self._stiffness = GRAVITY / length
+    def __init__(self, shape: WheelShape, slope: float, gravity: float, psi: float, rate: float, spread: float) -> None:
+        alpha = shape.alpha
+        self._stiffness = gravity / shape.length
         self._alpha, self._slope = alpha, slope
-        self._kept = math.cos(2.0 * alpha)
-        self._cell = math.floor((psi + alpha) / (2.0 * alpha))
+        self._kept = speed_kept(alpha)
+        self._cell, _ = stance(alpha, psi)
         self._pull = 0.0
         self.psi = psi
         """ψ [rad]."""

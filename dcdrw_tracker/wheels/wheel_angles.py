@@ -2,10 +2,10 @@
 
 from typing import NamedTuple
 
+from dcdrw_msgs_py.rolling import hub_travel
 from dcdrw_msgs_py.samples import JointSample, Turn
 from dcdrw_tracker.gait.cadence import Cadence, CadenceStatus
 from dcdrw_tracker.tags.wheel_view import PairView, WheelView
-from dcdrw_tracker.wheels.hub_travel import hub_travel
 from dcdrw_tracker.wheels.wheel_track import Taken, TrackParams, TrackStatus, WheelTrack
 
 

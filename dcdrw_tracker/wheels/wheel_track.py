@@ -7,7 +7,7 @@ import math
 from typing import Annotated, Literal, NamedTuple, get_args
 
 from dcdrw_msgs_py.quantity import Quantity
-from dcdrw_msgs_py.rig import RigParams, Slope, WheelShape
+from dcdrw_msgs_py.rig import Gravity, RigParams, Slope, WheelShape
 from dcdrw_tracker.gait.phase import MaxSpeed, PhaseParams
 from dcdrw_tracker.tags.wheel_view import WheelView
 from dcdrw_tracker.wheels.hub_travel import HubTravel
@@ -34,6 +34,7 @@ class TrackParams(NamedTuple):
     front: WheelShape = WheelShape()
     rear: WheelShape = WheelShape()
     slope: Slope = RigParams().slope
+    gravity: Gravity = RigParams().gravity
     camera_follows: Annotated[
         bool,
         Quantity(
@@ -245,7 +246,7 @@ class WheelTrack:
         path.reverse()
         rate = (path[-1] - path[0]) / ((stamp_ns - held[0].stamp_ns) * 1e-9)
         self._filter = StanceFilter(
-            self._shape.length, self._shape.alpha, self._params.slope, path[0], rate, _spread(held[0].view)
+            self._shape, self._params.slope, self._params.gravity, path[0], rate, _spread(held[0].view)
         )
         for earlier, later, seen in zip(held, held[1:], path[1:], strict=False):
             self._filter.predict((later.stamp_ns - earlier.stamp_ns) * 1e-9)

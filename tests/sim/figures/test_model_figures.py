@@ -5,7 +5,7 @@ import pytest
 
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.figures import model_figures as figures
-from dcdrw_sim.model.dynamics import gentlest_slope
+from dcdrw_sim.model.wheel import gentlest_slope
 from dcdrw_sim.relatives.footfall_order import steady_contacts
 from dcdrw_sim.relatives.rigid_pair import RigidPair, energy_per_metre, fastest_phase, slope_for_velocity
 from dcdrw_sim.relatives.rimless_wheel import limit_cycle_velocity

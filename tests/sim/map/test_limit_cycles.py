@@ -10,9 +10,11 @@ from scipy.integrate import quad
 from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_sim.map.limit_cycles import find_limit_cycles, losses
 from dcdrw_sim.map.return_map import ReturnMap
-from dcdrw_sim.model.dynamics import State, coupler, damper_power, kinetic_energy, limit_cycle_speed, stance_distance
+from dcdrw_sim.model.dynamics import State, coupler, damper_power, stance_distance
 from dcdrw_sim.model.presets import preset
-from dcdrw_sim.motion.ensemble import spread, take
+from dcdrw_sim.model.rigs import rig_at
+from dcdrw_sim.model.wheel import kinetic_energy, limit_cycle_speed
+from dcdrw_sim.motion.ensemble import spread
 from dcdrw_sim.motion.trajectory import run
 from tests.sim.rigs import UNCOUPLED, between
 
@@ -70,7 +72,7 @@ def test_the_contract_s_table():
 def test_each_is_that_of_the_return_map(rig):
     rigs, cycles = cycles_of(rig, b=[10.0, 20.0, 30.0])
     for index in range(3):
-        fixed = ReturnMap(take(rigs, index)).fixed_point()
+        fixed = ReturnMap(rig_at(rigs, index)).fixed_point()
         assert cycles.states[index] == pytest.approx(np.array(fixed.state), abs=1e-10)
         assert cycles.periods[index] == pytest.approx(fixed.period, abs=1e-10)
         assert cycles.derivatives[index] == pytest.approx(fixed.derivative, abs=1e-8)

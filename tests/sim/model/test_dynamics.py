@@ -11,15 +11,13 @@ from dcdrw_sim.model.dynamics import (
     coupler,
     coupler_force,
     damper_power,
-    gentlest_slope,
     hub_distance,
-    kinetic_energy,
-    limit_cycle_speed,
     mechanical_energy,
     reset,
     stance_distance,
     tipping,
 )
+from dcdrw_sim.model.wheel import gentlest_slope, kinetic_energy, limit_cycle_speed
 from dcdrw_sim.motion.ends import BACKWARD, FORWARD
 from tests.sim.oracle import paper_rates
 from tests.sim.rigs import ALPHA, GENTLE, UNEQUAL, between, rigs, rolling, starts
@@ -127,8 +125,8 @@ def test_four_spokes_keep_no_speed_through_a_strike():
 
 
 def test_reset_mirrors():
-    assert reset(ALPHA, 1.5, FORWARD) == (-ALPHA, 1.5 * math.cos(2 * ALPHA))
-    assert reset(ALPHA, -1.5, BACKWARD) == (ALPHA, -1.5 * math.cos(2 * ALPHA))
+    assert reset(ALPHA, 0.8, 1.5, FORWARD) == (-ALPHA, pytest.approx(1.2))
+    assert reset(ALPHA, 0.8, -1.5, BACKWARD) == (ALPHA, pytest.approx(-1.2))
 
 
 def at_rest(rig, i):

@@ -7,9 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dcdrw_msgs_py.rig import RigParams, WheelParams
-from dcdrw_sim.model.dynamics import State, gentlest_slope
+from dcdrw_sim.model.dynamics import State
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.start import start, starts
+from dcdrw_sim.model.wheel import gentlest_slope
 from dcdrw_sim.motion.pair import Simulation
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatedRig, SimulatorParams

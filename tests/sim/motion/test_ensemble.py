@@ -9,8 +9,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from dcdrw_msgs_py.rig import RigParams, WheelParams
-from dcdrw_sim.model.dynamics import State, limit_cycle_speed
+from dcdrw_sim.model.dynamics import State
 from dcdrw_sim.model.presets import preset
+from dcdrw_sim.model.wheel import limit_cycle_speed
 from dcdrw_sim.motion import trajectory
 from dcdrw_sim.motion.ends import BACKWARD, End, MotionError
 from dcdrw_sim.motion.ensemble import run_ensemble

@@ -6,9 +6,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from dcdrw_msgs_py.rig import RigParams, WheelParams
-from dcdrw_sim.model.dynamics import State, hub_distance, kinetic_energy, mechanical_energy, stance_distance
+from dcdrw_sim.model.dynamics import State, hub_distance, mechanical_energy, stance_distance
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.start import start
+from dcdrw_sim.model.wheel import kinetic_energy
 from dcdrw_sim.motion.cases import read_cases
 from dcdrw_sim.motion.ends import BACKWARD, FORWARD, End
 from dcdrw_sim.motion.pair import Simulation

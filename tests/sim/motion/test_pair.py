@@ -8,10 +8,11 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from dcdrw_msgs_py.rig import RigParams, WheelParams
-from dcdrw_sim.model.dynamics import State, coupler, limit_cycle_speed, mechanical_energy, stance_distance
+from dcdrw_sim.model.dynamics import State, coupler, mechanical_energy, stance_distance
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.scaling import Scales, dimensional
 from dcdrw_sim.model.start import start
+from dcdrw_sim.model.wheel import limit_cycle_speed
 from dcdrw_sim.motion import pair as module
 from dcdrw_sim.motion.ends import BACKWARD, FORWARD, HubsMetError, MotionError
 from dcdrw_sim.motion.pair import Simulation
@@ -287,7 +288,7 @@ def test_a_force_that_is_none_is_refused(force):
 
 def test_a_refused_rig_leaves_the_old_one():
     simulation = Simulation(*START)
-    with pytest.raises(ValueError, match='k must be ≥ 0 N/m'):
+    with pytest.raises(ValueError, match='k must be ≥ 0'):
         simulation.rig = PAPER._replace(k=-1.0)
     assert simulation.rig == START.rig
 
@@ -429,10 +430,10 @@ def test_a_leg_beyond_its_guard_is_refused_by_name(state, name):
 @pytest.mark.parametrize(
     ('change', 'message'),
     [
-        ({'k': -1.0}, 'k must be ≥ 0 N/m, got -1'),
-        ({'b': math.nan}, 'b must be ≥ 0 N·s/m, got nan'),
-        ({'b': 1e8}, r'b must be ≤ 1\.59e\+06 with these wheels'),
-        ({'k': 1e12}, r'k must be ≤ 5\.08e\+11 with these wheels'),
+        ({'k': -1.0}, r'k must be ≥ 0.* N/m, got -1'),
+        ({'b': math.nan}, r'b must be ≥ 0.* N·s/m, got nan'),
+        ({'b': 1e6, 'front': WheelParams(mass=1.0)}, r'b must be ≤ 2\.9e\+05 with these wheels'),
+        ({'k': 1e6, 'front': WheelParams(mass=1e-6)}, r'k must be ≤ 1\.02e\+05 with these wheels'),
         ({'slope': 1.0}, 'slope must be'),
         ({'gravity': 0.0}, 'gravity must be > 0'),
         ({'front': WheelParams(spokes=3.0)}, r'front\.spokes must be ≥ 4'),

@@ -18,7 +18,8 @@ def expanded(rig, state, external_force=0.0):
     """The work array of one pair."""
     rig = rig.resolved()
     w = [0.0] * taylor.END
-    work_parameters(w, 0, rig, external_force)
+    for row, value in work_parameters(rig, external_force).items():
+        w[row] = value
     w[S], (w[THETA1], w[OMEGA1], w[THETA2], w[OMEGA2]) = rig.S0, state
     taylor.expand(w, 1)
     return w
@@ -107,7 +108,8 @@ def test_all_lanes_of_an_array_give_what_a_list_gives_for_one():
     states = [State(-0.2 + 0.02 * l, 1.0 + 0.05 * l, 0.2 - 0.02 * l, 1.5) for l in range(LANES)]
     w = np.zeros(taylor.END)
     for l, state in enumerate(states):
-        work_parameters(w, l, UNEQUAL.resolved())
+        for row, value in work_parameters(UNEQUAL.resolved()).items():
+            w[row + l] = value
         w[S + l] = UNEQUAL.resolved().S0
         w[[THETA1 + l, OMEGA1 + l, THETA2 + l, OMEGA2 + l]] = state
     taylor.expand(w, LANES)

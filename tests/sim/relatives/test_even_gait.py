@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 
 from dcdrw_msgs_py.rig import WheelParams
 from dcdrw_sim.map.return_map import ReturnMap
-from dcdrw_sim.model.dynamics import gentlest_slope
 from dcdrw_sim.model.presets import preset
+from dcdrw_sim.model.wheel import gentlest_slope
 from dcdrw_sim.relatives.even_gait import even_gait, even_gait_on, even_stall_band, gentlest_even_gait, worst_damping
 
 ALPHA = math.radians(15.0)

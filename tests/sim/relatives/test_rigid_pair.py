@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from dcdrw_msgs_py.rig import RigParams, WheelParams
-from dcdrw_sim.model import dynamics
+from dcdrw_sim.model import wheel as wheel_alone
 from dcdrw_sim.model.dynamics import coupler
 from dcdrw_sim.motion.pair import Simulation
 from dcdrw_sim.relatives import rimless_wheel
@@ -270,7 +270,7 @@ def test_striking_at_once_it_is_a_single_wheel():
     gait = RigidPair(PAPER, 0.0).gait()
     wheel = PAPER.front
     assert gait.velocity == pytest.approx(rimless_wheel.limit_cycle_velocity(wheel, PAPER.slope, 9.81), rel=1e-10)
-    assert gentlest_slope(PAPER, 0.0) == pytest.approx(dynamics.gentlest_slope(wheel), rel=1e-9)
+    assert gentlest_slope(PAPER, 0.0) == pytest.approx(wheel_alone.gentlest_slope(wheel), rel=1e-9)
 
 
 @pytest.mark.parametrize('phase', [0.0, 0.25, 0.5, 0.9])

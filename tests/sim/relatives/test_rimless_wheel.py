@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 
 from dcdrw_msgs_py.rig import RigParams, WheelParams
-from dcdrw_sim.model.dynamics import State, gentlest_slope, limit_cycle_speed
+from dcdrw_sim.model.dynamics import State
+from dcdrw_sim.model.wheel import gentlest_slope, limit_cycle_speed
 from dcdrw_sim.motion.ends import BACKWARD, FORWARD
 from dcdrw_sim.motion.pair import Simulation
 from dcdrw_sim.relatives.rimless_wheel import (

@@ -7,10 +7,11 @@ import pytest
 
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.map.return_map import ReturnMap
-from dcdrw_sim.model.dynamics import State, damper_power, gentlest_slope, mechanical_energy
+from dcdrw_sim.model.dynamics import State, damper_power, mechanical_energy
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.scaling import dimensional, nondimensional
 from dcdrw_sim.model.start import starts
+from dcdrw_sim.model.wheel import gentlest_slope
 from dcdrw_sim.motion.ends import BACKWARD
 from dcdrw_sim.motion.ensemble import spread
 from dcdrw_sim.motion.trajectory import run

@@ -12,9 +12,10 @@ from dcdrw_sim.map.regression import steps_to_stay
 from dcdrw_sim.map.return_map import ReturnMap
 from dcdrw_sim.model.dynamics import State, hub_distance
 from dcdrw_sim.model.presets import preset
+from dcdrw_sim.model.rigs import rig_at, take
 from dcdrw_sim.model.scaling import Scales, dimensional
 from dcdrw_sim.motion.ends import End
-from dcdrw_sim.motion.ensemble import STRIKE, TOO_FAST, Ensemble, run_ensemble, run_pairs, spread, take
+from dcdrw_sim.motion.ensemble import STRIKE, TOO_FAST, Ensemble, run_ensemble, run_pairs, spread
 from dcdrw_sim.study.verdict import BAND, HOLD, Verdict, judge
 from tests.sim.rigs import ALPHA, GENTLE, UNCOUPLED, between
 
@@ -200,4 +201,4 @@ def test_units_do_not_matter_to_a_judgement(phase, k, b):
 def test_take_gives_the_rigs_of_some():
     rigs = spread(RigParams(), 3, {'front.mass': [8.0, 9.0, 10.0]})
     assert take(rigs, np.array([2, 0])).front.mass.tolist() == [10.0, 8.0]
-    assert take(rigs, 1).front.mass == 9.0
+    assert rig_at(rigs, 1).front.mass == 9.0

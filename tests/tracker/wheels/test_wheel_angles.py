@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dcdrw_msgs_py.rolling import hub_travel
 from dcdrw_msgs_py.samples import JointSample
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams
 from dcdrw_tracker.tags.wheel_view import PairView
-from dcdrw_tracker.wheels.hub_travel import hub_travel
 from dcdrw_tracker.wheels.wheel_angles import AnglesStatus, WheelAngles
 from dcdrw_tracker.wheels.wheel_track import TrackParams
 from tests.tracker.filming import between, film, hub, nothing, view
