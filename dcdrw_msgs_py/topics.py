@@ -99,6 +99,7 @@ DEBUG_IMAGE = Topic(
 )
 DIAGNOSTICS = Topic('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', 'health, 1 Hz')
 CLOCK = Topic('/clock', 'rosgraph_msgs/msg/Clock', 'simulated time, when asked')
+ROSOUT = Topic('/rosout', 'rcl_interfaces/msg/Log', 'what the nodes log', SAMPLE_DEPTH)
 PARAMETER_EVENTS = Topic(
     '/parameter_events', 'rcl_interfaces/msg/ParameterEvent', 'changes of parameters', SAMPLE_DEPTH
 )

@@ -28,7 +28,12 @@ _FILES = {
     '/live.css': ('live.css', 'text/css'),
     **{f'/{name}.js': (f'{name}.js', 'text/javascript') for name in ('live', 'controls', 'charts', 'rig', 'canvas')},
 }
-_COOKIE = 'dcdrw_live_token'
+_COOKIE = 'dcdrw_live_token_{port}'
+"""Cookies go to every port of a host: the name tells which server's it is."""
+_REQUEST_SECONDS = 5.0
+"""So long a connection may take to ask for something [s]."""
+_IDLE_SECONDS = 15.0
+"""So long one stays open between two requests [s]."""
 _BROWSERS = 32
 """Browsers at a time."""
 _HEADERS = {
@@ -77,6 +82,9 @@ class PageServer:
 
     def __init__(self, listener: socket.socket, token: str, kept: int, on_command: Callable[[str], None]) -> None:
         self._listener, self._token, self._on_command = listener, token, on_command
+        self._cookie = _COOKIE.format(port=listener.getsockname()[1])
+        self._known: set[Any] = set()
+        """Connections over which a whole request has come."""
         self._files = {path: ((PAGE / name).read_bytes(), kind) for path, (name, kind) in _FILES.items()}
         self._frames: deque[str] = deque(maxlen=kept)
         self._count = 0
@@ -110,11 +118,27 @@ class PageServer:
         app.router.add_get('/ws', self._watch)
         for path in self._files:
             app.router.add_get(path, self._file)
-        runner = web.AppRunner(app, access_log=None, handle_signals=False, shutdown_timeout=1.0)
+        runner = web.AppRunner(
+            app, access_log=None, handle_signals=False, shutdown_timeout=1.0, keepalive_timeout=_IDLE_SECONDS
+        )
         await runner.setup()
         await web.SockSite(runner, self._listener).start()
+        janitor = asyncio.create_task(self._hang_up(runner))
         await self._end.wait()
+        janitor.cancel()
         await runner.cleanup()
+
+    async def _hang_up(self, runner: web.AppRunner) -> None:
+        """Close connections that are open for a while without a whole request."""
+        since: dict[Any, float] = {}
+        while runner.server:
+            now, there = self._loop.time(), set(runner.server.connections)
+            self._known &= there
+            since = {connection: since.get(connection, now) for connection in there - self._known}
+            for connection, begun in since.items():
+                if now - begun > _REQUEST_SECONDS:
+                    connection.force_close()
+            await asyncio.sleep(_REQUEST_SECONDS / 5.0)
 
     async def _dismiss(self, _: web.Application) -> None:
         await asyncio.gather(*(browser.close(code=1001) for browser in tuple(self._browsers)))
@@ -128,8 +152,9 @@ class PageServer:
         The Host check keeps out pages whose name was made to point here (DNS rebinding), the Origin check pages of
         others that open our WebSocket with the visitor's cookie.
         """
-        given = request.query.get('token') or request.cookies.get(_COOKIE, '')
-        if self._token and not hmac.compare_digest(given.encode(), self._token.encode()):
+        self._known.add(request.protocol)
+        given = request.query.get('token') or request.cookies.get(self._cookie, '')
+        if self._token and not hmac.compare_digest(given.encode(errors='surrogateescape'), self._token.encode()):
             raise web.HTTPForbidden(text='The address needs the token that `dcdrw live` printed: /?token=...')
         if not self._token and not is_loopback(_parts(f'//{request.host}').hostname or ''):
             raise web.HTTPForbidden(text='Without a token this page is for 127.0.0.1 and localhost only.')
@@ -142,7 +167,7 @@ class PageServer:
         body, kind = self._files[request.path]
         response = web.Response(body=body, content_type=kind, charset='utf-8')
         if self._token and 'token' in request.query:  # so that the address need not keep it
-            response.set_cookie(_COOKIE, self._token, httponly=True, samesite='Strict')
+            response.set_cookie(self._cookie, self._token, httponly=True, samesite='Strict')
         return response
 
     async def _watch(self, request: web.Request) -> web.StreamResponse:

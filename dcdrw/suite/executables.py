@@ -30,6 +30,7 @@ from dcdrw_msgs_py.topics import (
     PHI,
     REAR_POSE,
     RIG_MARKERS,
+    ROSOUT,
     STEP_DIFFERENCE,
     SYNC_ERROR,
     SYNC_ERROR_PERCENT,
@@ -154,5 +155,6 @@ RECORDED = (
         if not topic.type.endswith(('Image', 'MarkerArray'))
     ),
     PARAMETER_EVENTS,
+    ROSOUT,
 )
 """The topics that a recorder keeps unasked: no pictures, and no drawings of what the others tell."""

@@ -19,6 +19,8 @@ from dcdrw_msgs_py.topics import JOINT_STATES
 from dcdrw_msgs_py.yaml_file import read_yaml
 
 SIMULATED, MEASURED = 'simulated', 'measured'
+_FORMULA = ('=', '+', '-', '@', '\t', '\r')
+"""What a spreadsheet that opens a CSV file takes for the beginning of a formula."""
 
 
 class RecordedTrial(NamedTuple):
@@ -81,12 +83,18 @@ def open_trial(path: Path, name: str, rig: Path | None = None, topic: str = JOIN
 
 
 def table(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
-    """CSV; what is unknown is empty."""
+    """CSV; what is unknown is empty, and text is never a formula to a spreadsheet."""
     file = StringIO()
     writer = csv.writer(file)
     writer.writerow(header)
-    writer.writerows(['' if isinstance(value, float) and math.isnan(value) else value for value in row] for row in rows)
+    writer.writerows(map(_cell, row) for row in rows)
     return file.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, float) and math.isnan(value):
+        return ''
+    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
 
 
 def step_rows(trial: RecordedTrial) -> Iterable[tuple[Any, ...]]:

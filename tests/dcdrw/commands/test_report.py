@@ -3,11 +3,13 @@
 import csv
 import re
 from html.parser import HTMLParser
+from io import StringIO
 
 import numpy as np
 import pytest
 
 from dcdrw.cli import main
+from dcdrw.trials.day import table
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatorParams
@@ -118,3 +120,9 @@ def test_trials_of_one_name_are_told_apart(tmp_path):
     bags = [measured_bag(tmp_path / day / 'bag', 0.3) for day in ('monday', 'tuesday')]
     assert main(['report', *map(str, bags), '--out', str(tmp_path / 'r.html')]) == 0
     assert [trial['trial'] for trial in rows(tmp_path / 'r.html', 'trials.csv')] == ['bag', 'bag (2)']
+
+
+def test_notes_are_no_formulas_to_a_spreadsheet():
+    notes = ['=1+1', '+1', '-1', '@SUM(A1)', '\t=1', 'plain = fine', -1.5, '']
+    rows = list(csv.reader(StringIO(table(('note',), ([note] for note in notes)))))
+    assert [row[0] for row in rows[1:]] == ["'=1+1", "'+1", "'-1", "'@SUM(A1)", "'\t=1", 'plain = fine', '-1.5', '']

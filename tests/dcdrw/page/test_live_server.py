@@ -152,6 +152,31 @@ def test_token_opens_everything_and_nothing_opens_without_it(guarded):
     assert 'SameSite=Strict' in cookie
 
 
+def test_cookie_belongs_to_one_port(guarded):
+    """Cookies know no ports: two servers of one machine do not take each other's."""
+
+    async def visit(client: ClientSession) -> str:
+        async with client.get(guarded.address, params={'token': TOKEN}) as answer:
+            return answer.headers['Set-Cookie']
+
+    assert browse(visit).startswith(f'dcdrw_live_token_{guarded.port}=')
+
+
+@pytest.mark.parametrize('given', [b'\xff\xfe', b'\xc3\xa9', b'\xed\xa0\x80', b'"', b'a=b; ;='])
+def test_cookie_of_odd_bytes_is_forbidden(guarded, given):
+    with socket.create_connection(('127.0.0.1', guarded.port), timeout=PATIENCE) as connection:
+        cookie = b'dcdrw_live_token_%d=' % guarded.port + given
+        connection.sendall(b'GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nCookie: %s\r\n\r\n' % cookie)
+        assert connection.recv(64).startswith(b'HTTP/1.1 403 ')
+
+
+@pytest.mark.parametrize('begun', [b'', b'GET / HTTP/1.1\r\nHost: loc'])
+def test_half_open_request_is_hung_up_on(served, begun):
+    with socket.create_connection(('127.0.0.1', served.port), timeout=PATIENCE) as connection:
+        connection.sendall(begun)
+        assert connection.recv(64) == b''  # the end, before the limit of this test
+
+
 def test_browser_that_comes_late_gets_what_is_kept_then_each_frame(served):
     for i in range(8):
         served.server.show({'i': i})

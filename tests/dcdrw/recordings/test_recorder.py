@@ -103,6 +103,24 @@ def test_messages_are_kept_as_they_came_off_the_wire(bench, tmp_path):
     assert times == sorted(times)
 
 
+def test_only_topics_that_somebody_speaks_on_are_recorded_and_the_log_is_among_them(bench, tmp_path):
+    process, joints, _ = start(bench, tmp_path / 'bag')
+    bench.node.get_logger().warning('heard by the recorder')
+    send(bench, joints)
+    bench.spin(0.5)
+    assert bench.end(process) == 0
+    with Recording(tmp_path / 'bag') as recording:
+        assert all(recording.count(topic) for topic in recording.topics)
+        assert {'/joint_states', '/rosout', '/diagnostics'} <= recording.topics.keys()
+        logged = [
+            TYPES.deserialize_cdr(data, 'rcl_interfaces/msg/Log') for _, _, data in recording.messages(['/rosout'])
+        ]
+    assert 'heard by the recorder' in [message.msg for message in logged]
+    metadata = yaml.safe_load((tmp_path / 'bag' / 'metadata.yaml').read_text())
+    for topic in metadata['rosbag2_bagfile_information']['topics_with_message_count']:
+        assert topic['message_count'] > 0
+
+
 def test_kill_costs_a_second_at_most(bench, tmp_path):
     process, joints, _ = start(bench, tmp_path / 'bag')
     for _ in range(100):
@@ -116,7 +134,7 @@ def test_kill_costs_a_second_at_most(bench, tmp_path):
 
 def test_full_disk_ends_the_recording_and_keeps_what_is_there(bench, tmp_path):
     process, joints, diagnostics = start(bench, tmp_path / 'bag')
-    bench.wait(lambda: send(bench, joints) and (tmp_path / FILE).stat().st_size > 6_000, 'a chunk')
+    bench.wait(lambda: send(bench, joints) and (tmp_path / FILE).stat().st_size > 30_000, 'a chunk')
     size = (tmp_path / FILE).stat().st_size
     resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (size + 100, size + 100))  # no file grows any more
     bench.wait(lambda: send(bench, joints) and said(diagnostics).get(STATE) == RecorderState.FAILED, 'the news')
@@ -140,10 +158,10 @@ def test_command_ends_with_a_message_where_the_disk_is_full(bench, tmp_path):
     )
     bench.processes.append(process)
     bench.wait(
-        lambda: send(bench, joints) and (tmp_path / FILE).exists() and (tmp_path / FILE).stat().st_size > 6_000,
+        lambda: send(bench, joints) and (tmp_path / FILE).exists() and (tmp_path / FILE).stat().st_size > 30_000,
         'a chunk',
     )
-    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (6_000, 6_000))
+    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (30_000, 30_000))
     bench.wait(lambda: send(bench, joints) and process.poll() is not None, 'the end')
     assert process.returncode == 1
     errors = process.communicate()[1]
