@@ -12,10 +12,15 @@ from launch_ros.substitutions import ExecutableInPackage, FindPackageShare
 from dcdrw.commands.urdf import make_urdf
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 
-SOURCES = ('sim', 'rig', 'recording')
+SOURCES = ('sim', 'rig', 'legs', 'recording')
 SWITCH = ('true', 'false')
 ARGUMENTS = {
-    'source': ('sim', 'sim: the simulator; rig: a camera and the tag tracker; recording: replayed', SOURCES),
+    'source': (
+        'sim',
+        'sim: the simulator; rig: a camera and the tag tracker; legs: sensors on legs and the leg tracker; '
+        'recording: replayed',
+        SOURCES,
+    ),
     'recording': ('', 'the recording to replay', None),
     'camera': (
         '',
@@ -89,6 +94,8 @@ def _actions(context):
         actions.append(command('live', *(['--rig', chosen['params_file']] if chosen['params_file'] else [])))
     if source == 'rig':
         actions.append(node('tag_tracker', **texts(source='camera', camera='calibration')))
+    elif source == 'legs':
+        actions.append(node('leg_tracker'))
     elif source == 'recording':
         actions.append(command('replay', chosen['recording'], *(['--rate', pace] if pace else [])))
     else:

@@ -92,3 +92,7 @@ def test_a_recording_takes_the_place_of_the_simulator(started):
 
 def test_a_rig_is_seen_by_the_tag_tracker(started):
     assert set(started(source='rig', camera='0', calibration='lens.yaml')['nodes']) == {*CORE, 'tag_tracker'}
+
+
+def test_people_are_followed_by_the_leg_tracker(started):
+    assert set(started(source='legs')['nodes']) == {*CORE, 'leg_tracker'}

@@ -21,15 +21,24 @@ class LegParams(NamedTuple):
     rear: WheelPitch = WheelPitch()
     silence: Annotated[
         float,
-        Quantity('a sensor silent for longer leaves a gap: its leg is unknown until it strikes again', 's', above=0.0),
+        Quantity(
+            'a sensor silent for longer leaves a gap: its leg is unknown until it strikes again',
+            's',
+            above=0.0,
+            live=True,
+        ),
     ] = 0.2
-    rate: Annotated[float, Quantity('samples that are published per second at most', 'Hz', above=0.0)] = 250.0
+    rate: Annotated[float, Quantity('samples that are published per second at most', 'Hz', above=0.0, live=True)] = (
+        250.0
+    )
     hip_joints: Annotated[
         tuple[str, ...], Quantity('names of the hips in leg_joint_states: front left and right, rear left and right')
     ] = HIPS
     hip_lead: Annotated[
         float,
-        Quantity('how long before the heel strikes a hip is flexed most, share of a stride', low=0.0, high=0.5),
+        Quantity(
+            'how long before the heel strikes a hip is flexed most, share of a stride', low=0.0, high=0.5, live=True
+        ),
     ] = 0.0
     max_future: Annotated[float, Quantity('a stamp further ahead of the clock is refused', 's', low=0.0, live=True)] = (
         0.5

@@ -23,9 +23,6 @@ lies ahead of the clock, or another kind of sensor tells of the same leg."""
 RESTART = 1.0
 """Stamps that go back by more are those of a source that starts anew, as a recording that is played again [s]."""
 
-PATIENCE_NS = 20_000_000
-"""The sensors' readings of one time come one after the other: those that lag by more are not waited for."""
-
 _Detector = ImuDetector | ContactDetector | ForceDetector | HipDetector
 _DETECTORS: dict[Kind, type[_Detector]] = {
     'imu': ImuDetector,
@@ -82,7 +79,10 @@ class LegTrackerStatus(NamedTuple):
 
 
 class LegTracker:
-    """Follows the legs of both halves, each by the kind of sensor that is heard of it first."""
+    """Follows the legs of both halves, each by the kind of sensor that is heard of it first.
+
+    It goes on to the time of which every sensor has told that is not silent.
+    """
 
     def __init__(self, params: LegParams) -> None:
         self.params = params
@@ -130,7 +130,7 @@ class LegTracker:
         track.take(reading, self.params.hip_lead)
         self._newest_ns = max(self._newest_ns, stamp_ns)
         heard = [one.stamp_ns for one in self._tracks.values() if one.stamp_ns is not None and self._is_heard(one)]
-        due_ns = max(min(heard), self._newest_ns - PATIENCE_NS)
+        due_ns = min(heard)  # what a sensor has yet to tell of is not guessed
         for each, one in self._tracks.items():
             self.strikes += [HeelStrike(each, struck_ns, self._newest_ns) for struck_ns in one.strikes(due_ns)]
         self._struck |= bool(self.strikes)

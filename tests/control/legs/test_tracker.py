@@ -125,3 +125,19 @@ def test_a_hip_that_is_flexed_before_the_heel_strikes_is_told_by_hip_lead():
     ]
     last = follow(readings, LegParams(hip_lead=lead)).updates[-1]
     assert last.legs[LEFT].angle / math.tau % 1.0 == pytest.approx(last.stamp_ns / 1e9 / PERIOD % 1.0, abs=0.03)
+
+
+@pytest.mark.parametrize('burst', [3, 10, 15])
+def test_sensors_that_come_in_bursts_change_nothing(burst):
+    """Each leg's readings come many at once, as over a busy network: the phases are those of readings in order."""
+    in_order, size = contacts(), burst * len(LEGS)
+    parts = [in_order[start : start + size] for start in range(0, len(in_order), size)]
+    bursts = [reading for part in parts for leg in LEGS for reading in part if reading.leg == leg]
+    expected = {update.stamp_ns: update for update in follow(in_order).updates}
+    updates = follow(bursts).updates
+    assert len(updates) > 0.9 * len(expected)
+    for update in updates:
+        same = expected[update.stamp_ns]
+        assert update.legs.keys() == same.legs.keys()
+        for leg, turn in update.legs.items():
+            assert turn.angle == pytest.approx(same.legs[leg].angle, abs=1e-9)
