@@ -1,6 +1,6 @@
 """What the leg tracker can be told."""
 
-from typing import Annotated, Literal, NamedTuple, get_args
+from typing import Annotated, Literal, NamedTuple
 
 from dcdrw_msgs_py.quantity import Quantity
 from dcdrw_msgs_py.rig import FRONT, REAR, WheelPitch
@@ -8,9 +8,6 @@ from dcdrw_msgs_py.topics import SIDES
 
 Kind = Literal['imu', 'contact', 'wrench', 'hip']
 """What kind of sensor a leg wears."""
-KINDS: tuple[Kind, ...] = get_args(Kind)
-
-
 HIPS = tuple(f'{half}_{side}_hip' for half in (FRONT, REAR) for side in SIDES)
 
 
