@@ -11,7 +11,18 @@ from geometry_msgs.msg import PointStamped
 from sensor_msgs.msg import JointState
 
 from dcdrw_msgs_py.diagnosis import Diagnosis, Level, value_text
-from dcdrw_msgs_py.samples import RUN, SECOND, CouplerSample, Footfall, JointSample, PhaseSample, Turn, run_of
+from dcdrw_msgs_py.rig import FRONT, REAR
+from dcdrw_msgs_py.samples import (
+    RUN,
+    SECOND,
+    CouplerSample,
+    Footfall,
+    JointSample,
+    LoneWheel,
+    PhaseSample,
+    Turn,
+    run_of,
+)
 from dcdrw_msgs_py.topics import (
     COUPLER,
     FRONT_STANCE,
@@ -88,6 +99,8 @@ class JointSampleReader:
 
     def __init__(self, front: str = FRONT_WHEEL, rear: str = REAR_WHEEL, coupler: str = COUPLER) -> None:
         self._joints = Joints((front, rear), (coupler,))
+        self._any = Joints((), (front, rear, coupler))
+        self._wheels = {FRONT: front, REAR: rear}
 
     def read(self, message: Any) -> JointSample:
         """The sample in a message.
@@ -101,6 +114,25 @@ class JointSampleReader:
             stamp_ns(message.header.stamp),
             Turn(*front[:2]),
             Turn(*rear[:2]),
+            CouplerSample(*coupler),
+            run_of(message.header.frame_id),
+        )
+
+    def read_any(self, message: Any) -> JointSample | LoneWheel:
+        """The sample in a message, or the one wheel that it has.
+
+        Raises:
+            ValueError: as `Joints.read`; neither wheel is there.
+
+        """
+        present = [wheel for wheel, name in self._wheels.items() if name in message.name]
+        if len(present) != 1:
+            return self.read(message)
+        front, rear, coupler = self._any.read(message)
+        return LoneWheel(
+            stamp_ns(message.header.stamp),
+            present[0],
+            Turn(*(front if present[0] == FRONT else rear)[:2]),
             CouplerSample(*coupler),
             run_of(message.header.frame_id),
         )

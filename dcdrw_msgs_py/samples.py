@@ -48,6 +48,17 @@ class JointSample(NamedTuple):
     number. 0: the source does not say."""
 
 
+class LoneWheel(NamedTuple):
+    """A `joint_states` message that has one of the wheels only."""
+
+    stamp_ns: int
+    wheel: str
+    """`front` or `rear`."""
+    turn: Turn
+    coupler: CouplerSample = CouplerSample()
+    run: int = 0
+
+
 class PoseSample(NamedTuple):
     """Where another tracker, as a motion capture system, sees one wheel: its hub and its body's frame, z up."""
 

@@ -43,11 +43,21 @@ def decode_joints(messages: list[bytes], log_ns: Sequence[int] = ()) -> Iterator
             yield _MALFORMED
             rows, times = rows[1:], times[1:]
             continue
-        fixed = rows[:, layout.fixed]
-        differs = (fixed != fixed[0]).any(axis=1)
-        count = int(differs.argmax()) if differs.any() else len(rows)
+        count = _alike(rows, layout.fixed)
         yield layout.read(rows[:count])._replace(log_ns=times[:count])
         rows, times = rows[count:], times[count:]
+
+
+def _alike(rows: NDArray[np.uint8], fixed: NDArray[np.bool_]) -> int:
+    """How many rows from the first on agree with it in these bytes; looks further the longer they do."""
+    ahead = 8
+    while True:
+        differs = (rows[:ahead, fixed] != rows[0, fixed]).any(axis=1)
+        if differs.any():
+            return int(differs.argmax())
+        if ahead >= len(rows):
+            return len(rows)
+        ahead *= 8
 
 
 _NONE = np.empty((1, 0))

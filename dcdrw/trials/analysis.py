@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dcdrw.recordings.joint_batch import JointBatch
+from dcdrw.recordings.lone_wheels import LoneWheels
 from dcdrw.suite.parameter_file import TrialParams
 from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.rolling import phi_pitch
@@ -141,6 +142,7 @@ def _no_collections() -> Iterator[None]:
 class _Trial:
     def __init__(self, params: TrialParams) -> None:
         self._params = params
+        self._lone = LoneWheels(params.phase)
         self._estimator = PhaseEstimator(params.phase)
         self._monitor = SyncMonitor(params.sync)
         self._moving = False
@@ -152,7 +154,15 @@ class _Trial:
         self._unreadable = ''
 
     def take(self, batch: JointBatch) -> None:
-        """Feed one batch through both cores."""
+        """Feed one batch through both cores; wheels in messages of their own are joined first."""
+        if self._lone.belongs(batch):
+            joined = self._lone.take(batch)
+            if joined:
+                self._take(joined)
+            return
+        self._take(batch)
+
+    def _take(self, batch: JointBatch) -> None:
         joints = self._params.phase
         error = batch.error or _missing(batch.names, (joints.front_joint, joints.rear_joint))
         if error:
@@ -253,6 +263,12 @@ class _Trial:
 
     def result(self) -> Analysis:
         """All that there is."""
+        rest = self._lone.rest()
+        if rest:
+            self._take(rest)
+        if self._lone.unpaired:
+            self._estimator.refuse('unpaired', self._lone.unpaired)
+        self._estimator.note_unstamped(self._lone.unstamped)
         motion = (
             Motion(*(np.concatenate(column) for column in zip(*self._parts, strict=True)))
             if self._parts

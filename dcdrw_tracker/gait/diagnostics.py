@@ -124,6 +124,7 @@ def _judge_phase(status: PhaseStatus, age: float, stale_after: float) -> tuple[L
 
 _REASONS: dict[Refusal, str] = {
     'unreadable': 'a wheel is missing, or the message is malformed (see the parameters front_joint and rear_joint)',
+    'unpaired': "each wheel comes in messages of its own, and the rear one's stay away",
     'not finite': 'a rotation is no finite number',
     'repeated': 'the stamp stands still',
     'reversed': 'the stamp goes back',

@@ -16,9 +16,9 @@ from dcdrw_msgs_py.topics import COUPLER, FRONT_WHEEL, REAR_WHEEL
 from dcdrw_tracker.gait.cadence import Cadence, CadenceStatus
 from dcdrw_tracker.gait.rotation import Rotation, Strike, Tolerance
 
-Refusal = Literal['unreadable', 'not finite', 'repeated', 'reversed', 'future', 'outlier']
-"""Why a sample is refused: the message lacks a wheel, a rotation is no number, the stamp stands still, goes back or
-lies ahead of the clock, or no wheel turns that fast."""
+Refusal = Literal['unreadable', 'unpaired', 'not finite', 'repeated', 'reversed', 'future', 'outlier']
+"""Why a sample is refused: the message has neither wheel, the other wheel's message of that time is missing, a rotation
+is no number, the stamp stands still, goes back or lies ahead of the clock, or no wheel turns that fast."""
 
 Cause = Literal['announced', 'stamp', 'rotation']
 """Why the source is taken to have started anew: it says so, its stamps went back, or its rotations jumped."""

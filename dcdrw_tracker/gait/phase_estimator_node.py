@@ -9,9 +9,11 @@ from std_msgs.msg import Float64, Int32
 from dcdrw_msgs_py.diagnosis import Diagnosis
 from dcdrw_msgs_py.messages import JointSampleReader, PhaseSampleWriter, footfall_message
 from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run
+from dcdrw_msgs_py.samples import LoneWheel
 from dcdrw_msgs_py.topics import FOOTFALLS, JOINT_STATES, PHASE_STATE, PHI, STEP_DIFFERENCE
 from dcdrw_tracker.gait.diagnostics import diagnose_phase
-from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams
+from dcdrw_tracker.gait.pairing import WheelPairs
+from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams, PhaseUpdate
 
 STALE_AFTER = 1.0
 """Age of the last accepted sample from which the input is stale [s]."""
@@ -26,6 +28,7 @@ class PhaseEstimatorNode(Node):
         params = parameters.value
         self._estimator = PhaseEstimator(params)
         self._reader = JointSampleReader(params.front_joint, params.rear_joint, params.coupler_joint)
+        self._pairs = WheelPairs()
         self._writer = PhaseSampleWriter()
         self._phase = advertise(self, PHASE_STATE)
         self._phi = advertise(self, PHI)
@@ -38,14 +41,24 @@ class PhaseEstimatorNode(Node):
 
     def _on_joints(self, message: Any) -> None:
         try:
-            joints = self._reader.read(message)
+            read = self._reader.read_any(message)
         except ValueError as error:
             self._estimator.refuse('unreadable')
             self.get_logger().warning(f'joint_states: {error}', throttle_duration_sec=1.0)
             return
-        update = self._estimator.update(joints, self.get_clock().now().nanoseconds)
-        if update is None:
-            return
+        if isinstance(read, LoneWheel):
+            unpaired = self._pairs.unpaired
+            samples = self._pairs.take(read)
+            if missing := self._pairs.unpaired - unpaired:
+                self._estimator.refuse('unpaired', missing)
+        else:
+            samples = [read]
+        now_ns = self.get_clock().now().nanoseconds
+        for joints in samples:
+            if update := self._estimator.update(joints, now_ns):
+                self._publish(update)
+
+    def _publish(self, update: PhaseUpdate) -> None:
         self._age.renew()
         for phase in (*update.held, update.phase):
             self._phase.publish(self._writer.write(phase))

@@ -1,0 +1,65 @@
+"""Recordings in which each wheel has messages of its own: joined into joint states of both."""
+
+import numpy as np
+
+from dcdrw.recordings.joint_batch import JointBatch
+from dcdrw_msgs_py.rig import FRONT, REAR
+from dcdrw_msgs_py.samples import JointSample, LoneWheel, Turn
+from dcdrw_tracker.gait.pairing import WheelPairs
+from dcdrw_tracker.gait.phase import PhaseParams
+
+ENOUGH = 4096
+"""Joint states that are handed on at once."""
+
+
+class LoneWheels:
+    """Takes batches that name one of the wheels only; hands on batches of both."""
+
+    def __init__(self, joints: PhaseParams) -> None:
+        self._names = {joints.front_joint: FRONT, joints.rear_joint: REAR}
+        self._pairs = WheelPairs()
+        self._joined: list[JointSample] = []
+        self._log_ns: list[int] = []
+        self.unstamped = 0
+        """Messages without a stamp, to which the time of recording was given."""
+
+    @property
+    def unpaired(self) -> int:
+        """Messages of the front wheel to which none of the rear one belongs."""
+        return self._pairs.unpaired
+
+    def belongs(self, batch: JointBatch) -> bool:
+        """Whether a batch has just one of the wheels."""
+        return not batch.error and sum(batch.names.count(name) for name in self._names) == 1
+
+    def take(self, batch: JointBatch) -> JointBatch | None:
+        """Take a batch; returns the joint states that are complete, once there are enough."""
+        name = next(name for name in self._names if name in batch.names)
+        column = batch.names.index(name)
+        rows = zip(batch.stamp_ns.tolist(), batch.position[:, column], batch.velocity[:, column], strict=True)
+        times = batch.log_ns.tolist() or [0] * batch.messages
+        for (stamp_ns, angle, rate), log_ns in zip(rows, times, strict=True):
+            if stamp_ns == 0 and log_ns:
+                stamp_ns = log_ns
+                self.unstamped += 1
+            joined = self._pairs.take(LoneWheel(stamp_ns, self._names[name], Turn(float(angle), float(rate))))
+            self._joined += joined
+            self._log_ns += [log_ns] * len(joined)
+        return self.rest() if len(self._joined) >= ENOUGH else None
+
+    def rest(self) -> JointBatch | None:
+        """The joint states that are left."""
+        samples, log_ns = self._joined, self._log_ns
+        if not samples:
+            return None
+        self._joined, self._log_ns = [], []
+        turns = np.array([(*sample.front, *sample.rear) for sample in samples])
+        return JointBatch(
+            '',
+            tuple(self._names),
+            np.array([sample.stamp_ns for sample in samples], np.int64),
+            turns[:, ::2],
+            turns[:, 1::2],
+            np.full((len(samples), 2), np.nan),
+            log_ns=np.array(log_ns, np.int64),
+        )
