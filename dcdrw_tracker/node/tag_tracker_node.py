@@ -261,6 +261,8 @@ class TagTrackerNode(Node):
         if self._reader:
             return self._reader.state
         if self._source.source == POSES:
+            if self._pairs.waits:
+                return 'waiting for a wheel to turn by 10°, which shows whether the axes are as told'
             names = ' and '.join(self.resolve_topic_name(topic.name) for topic in (FRONT_POSE, REAR_POSE))
             return f'no poses of both wheels come on {names}'
         name = self._subscription.topic_name

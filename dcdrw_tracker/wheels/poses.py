@@ -17,6 +17,18 @@ Floats = NDArray[np.float64]
 AXES = 'xyz'
 LONGEST_PAUSE_NS = 100_000_000
 """Over a longer pause a pose is neither waited for nor interpolated."""
+TURNED = math.radians(10.0)
+"""A wheel that has turned so far shows which way its axle lies [rad]."""
+ACROSS = 0.9
+"""The axle must lie across downhill to within this cosine."""
+OFF_SLOPE = 0.3
+"""A hub that is further from the line on which the hubs travel is on no wheel that rolls [m]."""
+FEW = 10
+"""Hubs that tell where this line lies."""
+RECENT = 200
+"""Hubs over which the line is taken."""
+MOST_WAITING = 600
+"""Views that are kept until a wheel has turned."""
 LEAST_LEVER = 0.5
 """A body's axis must lie at least so far in the plane of its wheel, as a share of its length."""
 
@@ -26,17 +38,22 @@ OffsetDeg = Annotated[
 
 
 class PoseParams(NamedTuple):
-    """How the bodies that are tracked lie in the wheels, and the slope in the room (z up)."""
+    """How the bodies that are tracked lie in the wheels, and the slope in the room."""
 
     heading_deg: Annotated[
         float,
         Quantity(
-            'direction of downhill in the room, from x towards y', 'deg', derived='from the rear hub to the front one'
+            'direction of downhill in the room, from x towards y (with y up: towards -z)',
+            'deg',
+            derived='from the rear hub to the front one',
         ),
     ] = math.nan
     spoke_axis: Annotated[str, Quantity("axis of each wheel's body that lies along a spoke: x, y or z")] = 'z'
     front_offset_deg: OffsetDeg = 0.0
     rear_offset_deg: OffsetDeg = 0.0
+    up_axis: Annotated[
+        str, Quantity("the room's axis that points up; y: as OptiTrack streams by default", choices=('z', 'y'))
+    ] = 'z'
 
     def check_axis(self) -> None:
         """Refuse an axis that there is not.
@@ -61,7 +78,12 @@ class PosePairs:
     """Makes views of the pair from the poses of each wheel.
 
     The wheels' poses need not come at the same instants, nor in order: a view is made at each pose of the front wheel,
-    the rear one being interpolated between its poses on either side. A wheel whose poses stay away is not seen.
+    the rear one being interpolated between its poses on either side. A wheel whose poses stay away is not seen; nor is
+    one whose poses repeat to the last bit, are a default, or lie off the slope: so trackers send them while a body is
+    hidden.
+
+    Views are held back until a wheel has turned far enough to show that its axle lies across downhill: else the
+    room's axes are not those that were told, and every view would be wrong.
 
     Raises:
         ValueError: an impossible axis.
@@ -78,6 +100,16 @@ class PosePairs:
         self._front: deque[_Seen] = deque()
         self._rear: deque[_Seen] = deque()
         self._last_ns = 0
+        self._y_up = params.up_axis == 'y'
+        self._latest: dict[str, PoseSample] = {}
+        self._heights: deque[float] = deque(maxlen=RECENT)
+        self._level = math.nan
+        self._waiting: deque[PairView] | None = deque(maxlen=MOST_WAITING)
+
+    @property
+    def waits(self) -> bool:
+        """Whether views are held back until a wheel has turned."""
+        return bool(self._waiting)
 
     def take(self, wheel: str, pose: PoseSample) -> list[PairView]:
         """Take the next pose of a wheel, `front` or `rear`; returns the views that it completes, in order.
@@ -86,24 +118,69 @@ class PosePairs:
             ValueError: no pose, as motion capture sends where it has lost a body, or a body whose axis is no spoke.
 
         """
+        if pose.stamp_ns == 0:
+            raise ValueError('the stamps are zero: without their time poses tell no motion; let the source stamp them')
         if not all(map(math.isfinite, (*pose.position, *pose.orientation))):
             raise ValueError('position or orientation is no number')
         if not abs(math.hypot(*pose.orientation) - 1.0) < 0.01:
             raise ValueError(f'the orientation {pose.orientation} is no unit quaternion')
+        if not any(pose.position) and not any(pose.orientation[:3]):
+            raise ValueError(f'the {wheel} wheel is at the origin, unturned: a default pose, sent while it is hidden')
+        latest = self._latest.get(wheel)
+        self._latest[wheel] = pose
+        if latest and latest[1:] == pose[1:]:
+            raise ValueError(f'the pose of the {wheel} wheel repeats to the last bit, as where it is hidden')
+        if self._y_up:
+            pose = _z_up(pose)
         if self._basis is None:
             self._find_heading(wheel, pose)
         if self._basis is None:
             return []
         seen = self._seen(wheel, pose, self._basis)
+        self._check_height(wheel, seen.hub[1])
         queue = self._front if wheel == FRONT else self._rear
         if queue and seen.stamp_ns <= queue[-1].stamp_ns:
             queue.clear()  # the stream has started anew
             self._last_ns = 0
         queue.append(seen)
-        return self._views()
+        return self._released(self._views(), wheel, pose, self._basis)
+
+    def _check_height(self, wheel: str, height: float) -> None:
+        """Refuse a hub that is off the line along the slope on which the hubs travel."""
+        if abs(height - self._level) > OFF_SLOPE:
+            raise ValueError(
+                f'the hub of the {wheel} wheel is {abs(height - self._level):.1f} m off the line on which hubs travel: '
+                'it is hidden or carried, or slope and up_axis are not those of the room'
+            )
+        self._heights.append(height)
+        if len(self._heights) >= FEW and (math.isnan(self._level) or len(self._heights) < RECENT):
+            self._level = sorted(self._heights)[len(self._heights) // 2]
+
+    def _released(self, views: list[PairView], wheel: str, pose: PoseSample, basis: Floats) -> list[PairView]:
+        """These views, and those that were held back once the wheels' axle is known to lie across downhill."""
+        if self._waiting is None:
+            return views
+        self._waiting.extend(views)
+        axle, turned = _turn(self._first.setdefault(wheel, pose).orientation, pose.orientation)
+        if turned < TURNED:
+            return []
+        across = np.cross(basis[1], basis[0])
+        if abs(float(axle @ across)) < ACROSS:
+            self._waiting.clear()
+            if abs(axle[2]) >= ACROSS:
+                up, other = 'yz' if self._y_up else 'zy'
+                raise ValueError(
+                    f'the wheels turn about the axis that should point up, {up}; is {other} up? set up_axis to {other}'
+                )
+            raise ValueError(
+                f'the {wheel} wheel does not turn about an axis across downhill: see heading_deg and up_axis'
+            )
+        views = list(self._waiting)
+        self._waiting = None
+        return views
 
     def _find_heading(self, wheel: str, pose: PoseSample) -> None:
-        self._first[wheel] = pose
+        self._first.setdefault(wheel, pose)
         if len(self._first) == 2:
             front, rear = (self._first[name].position for name in (FRONT, REAR))
             self._basis = _basis(math.atan2(front[1] - rear[1], front[0] - rear[0]), self._slope)
@@ -176,3 +253,19 @@ def _axis(orientation: tuple[float, float, float, float], axis: int) -> Floats:
         (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)),
     )
     return np.array(columns[axis])
+
+
+def _z_up(pose: PoseSample) -> PoseSample:
+    """The same in a room whose z points up, of one whose y does: turned by 90° about x."""
+    (x, y, z), (qx, qy, qz, qw) = pose.position, pose.orientation
+    half = math.sqrt(0.5)
+    turned = (half * (qx + qw), half * (qy - qz), half * (qz + qy), half * (qw - qx))
+    return PoseSample(pose.stamp_ns, (x, -z, y), turned)
+
+
+def _turn(first: tuple[float, float, float, float], then: tuple[float, float, float, float]) -> tuple[Floats, float]:
+    """Axis in the room (a unit vector) and angle [rad] of the turn from one orientation to another, then · first⁻¹."""
+    a, b = np.array(first[:3]), np.array(then[:3])
+    vector = first[3] * b - then[3] * a - np.cross(b, a)
+    sine, cosine = float(np.linalg.norm(vector)), then[3] * first[3] + float(b @ a)
+    return vector / sine if sine else vector, 2.0 * math.atan2(sine, abs(cosine))

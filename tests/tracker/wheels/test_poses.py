@@ -57,8 +57,8 @@ def test_rotation_is_that_about_the_rigs_left_axis(psi, heading, axis, offset_de
     mounted = Rotation.from_euler('y', -math.radians(offset_deg)) * onto_z
     params = PoseParams(math.nan if learned else math.degrees(heading), axis, offset_deg, offset_deg)
     poses = [
-        (wheel, in_room(psi, x, stamp, heading, mounted))
-        for stamp in (10, 20)
+        (wheel, in_room(psi - turn, x, stamp, heading, mounted))
+        for stamp, turn in ((10, 0.3), (20, 0.0))
         for wheel, x in ((FRONT, 2.5), (REAR, 1.0))
     ]
     view = paired(poses, params)[-1]
@@ -122,8 +122,10 @@ def test_a_stream_that_starts_anew_goes_on():
 @pytest.mark.parametrize(
     ('pose', 'message'),
     [
-        (PoseSample(0, (math.nan, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), 'is no number'),
-        (PoseSample(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)), 'is no unit quaternion'),
+        (PoseSample(0, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), 'the stamps are zero: without their time'),
+        (PoseSample(9, (math.nan, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), 'is no number'),
+        (PoseSample(9, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)), 'is no unit quaternion'),
+        (PoseSample(9, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), 'at the origin, unturned: a default pose'),
     ],
 )
 def test_what_is_no_pose_is_told(pose, message):
@@ -136,3 +138,106 @@ def test_a_wrong_axis_is_told():
         paired(streams(walk(1.0)), PoseParams(spoke_axis='y'))
     with pytest.raises(ValueError, match="spoke_axis must be x, y or z, got 'w'"):
         PosePairs(PoseParams(spoke_axis='w'), SLOPE)
+
+
+def taken(poses, params=PoseParams()):  # noqa: B008
+    """Joint samples, and what was refused with which words."""
+    pairs, angles, samples, refused = PosePairs(params, SLOPE), WheelAngles(TrackParams()), [], []
+    for wheel, pose in poses:
+        try:
+            views = pairs.take(wheel, pose)
+        except ValueError as error:
+            refused.append(str(error))
+            continue
+        samples += [sample for sample in map(angles.update, views) if sample]
+    return samples, refused
+
+
+def worst_error(samples, truth):
+    """The largest error of a rotation [rad], whole turns aside."""
+    index = [round((sample.stamp_ns - START_NS) * 1e-9 * 120.0) for sample in samples]
+    turned = np.array([(sample.front.angle, sample.rear.angle) for sample in samples])
+    off = turned - np.column_stack([truth.front, truth.rear])[index]
+    return np.abs(np.angle(np.exp(1j * off))).max()
+
+
+@pytest.mark.parametrize('wheel', [FRONT, REAR])
+@pytest.mark.parametrize(
+    'hide',
+    [
+        pytest.param(lambda pose, last: last._replace(stamp_ns=pose.stamp_ns), id='the last pose again'),
+        pytest.param(
+            lambda pose, last: PoseSample(pose.stamp_ns, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), id='a default pose'
+        ),
+        pytest.param(
+            lambda pose, last: PoseSample(pose.stamp_ns, (7.0, -2.0, 3.0), (0.0, 0.0, 0.0, 1.0)), id='somewhere else'
+        ),
+    ],
+)
+@pytest.mark.parametrize('seconds', [0.3, 2.0])
+def test_a_hidden_wheel_leaves_a_gap_and_no_wrong_sample(wheel, hide, seconds):
+    truth = walk(8.0, 120.0)
+    last, poses = None, []
+    for name, pose in streams(truth):
+        if name == wheel and 3.0 < (pose.stamp_ns - START_NS) * 1e-9 < 3.0 + seconds:
+            poses.append((name, hide(pose, last)))
+            continue
+        last = pose if name == wheel else last
+        poses.append((name, pose))
+    samples, refused = taken(poses)
+    assert len(refused) >= round(120 * seconds) - 1
+    assert len(samples) > truth.time.size - 120 * seconds - 30
+    assert worst_error(samples, truth) < 1e-3
+
+
+def y_up(pose):
+    """The same in a room whose y points up."""
+    (x, y, z), turn = pose.position, Rotation.from_quat(pose.orientation)
+    orientation = (Rotation.from_euler('x', -math.pi / 2) * turn).as_quat()
+    return pose._replace(position=(x, z, -y), orientation=tuple(orientation.tolist()))
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.floats(-math.pi, math.pi))
+def test_a_room_with_y_up_is_as_good_where_it_is_told(heading):
+    truth = walk(3.0, 120.0)
+    poses = [(wheel, y_up(pose)) for wheel, pose in streams(truth, heading=heading)]
+    samples, refused = taken(poses, PoseParams(up_axis='y'))
+    assert not refused
+    assert len(samples) > truth.time.size - 10
+    assert worst_error(samples, truth) < 1e-3
+
+
+@pytest.mark.parametrize('body', ['x', 'y', 'z'])
+def test_where_another_axis_is_up_nothing_is_given_out_and_the_mend_is_told(body):
+    mounted = {
+        'x': Rotation.from_euler('y', -math.pi / 2),
+        'y': Rotation.from_euler('x', math.pi / 2),
+        'z': Rotation.identity(),
+    }[body]
+    poses = [(wheel, y_up(pose)) for wheel, pose in streams(walk(4.0, 120.0), mounted=mounted)]
+    for axis in 'xyz':
+        samples, refused = taken(poses, PoseParams(spoke_axis=axis))
+        assert samples == []
+        assert refused
+    samples, refused = taken(streams(walk(4.0, 120.0)), PoseParams(up_axis='y', spoke_axis='x'))
+    assert samples == []
+    assert any('is z up? set up_axis to z' in why for why in refused)
+
+
+def test_wheels_that_were_held_are_seen_from_the_start():
+    truth = walk(4.0, 120.0)
+    noise = np.random.default_rng(1)
+    still = [
+        (wheel, in_room(psi + noise.normal(0.0, 1e-4), x, START_NS - round((240 - k) / 120.0 * 1e9)))
+        for k in range(240)
+        for wheel, psi, x in (
+            (FRONT, truth.front[0], hub(truth.front[:1])[0] + 1.2),
+            (REAR, truth.rear[0], hub(truth.rear[:1])[0]),
+        )
+    ]
+    pairs = PosePairs(PoseParams(), SLOPE)
+    assert not [view for wheel, pose in still for view in pairs.take(wheel, pose)]
+    assert pairs.waits
+    samples, _ = taken(still + streams(truth))
+    assert len(samples) > 240 + truth.time.size - 10
