@@ -7,6 +7,7 @@ from dcdrw.console import Bar
 from dcdrw.files import to_json, write_csv, write_text, write_whole
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.leg_recording import find_topic, leg_topics, namespace_of, wheel_batches
+from dcdrw.recordings.pose_recording import pose_batches, pose_topics
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw.trials.agreement import Agreement, compare
@@ -46,17 +47,25 @@ def read_trial(
             params = read_parameter_file(rig, params)
         trial = analyze(batches, params)
         if trial.unreadable and not len(trial.motion.stamp_ns):
-            raise ValueError(f'{path}: {name}: {trial.unreadable} (front_joint and rear_joint in a rig file name them)')
+            mend = (
+                ' (front_joint and rear_joint in a rig file name them)' if trial.unreadable.startswith('joint') else ''
+            )
+            raise ValueError(f'{path}: {name}: {trial.unreadable}{mend}')
         agreements = compare(recording, trial, name.rpartition('/')[0])
         return trial._replace(damage=tuple(recording.damage), notes=tuple(recording.notes)), agreements
 
 
 def _joint_states(recording: Recording, topic: str, rig: Path | None) -> tuple[str, Iterable[JointBatch]]:
-    """The topic's name, and what it holds; where only sensors on legs were recorded, what leg_tracker makes of them."""
-    legs = leg_topics(recording)
-    if not legs or topic != JOINT_STATES.name or find_topic(recording, JOINT_STATES):
+    """The topic's name, and what it holds.
+
+    Where only poses of the wheels or sensors on legs were recorded, what tag_tracker or leg_tracker makes of them.
+    """
+    legs, poses = leg_topics(recording), pose_topics(recording)
+    if not (legs or poses) or topic != JOINT_STATES.name or find_topic(recording, JOINT_STATES):
         name = recording.find(topic)
         return name, _shown(recording.joints(name), recording.count(name))
+    if poses:
+        return f'{poses[0].rpartition("/")[0]}/{topic}', pose_batches(recording, rig)
     updates = follow_recording(recording, rig).updates
     if not any(len(update.wheels) == 2 for update in updates):
         raise ValueError(

@@ -191,7 +191,7 @@ class PosePairs:
         if math.hypot(downhill, normal) < LEAST_LEVER:
             raise ValueError(
                 f"the {AXES[self._axis]} axis of the {wheel} wheel's body lies along its axle: "
-                'set spoke_axis to one that lies along a spoke'
+                'set spoke_axis to one that lies along a spoke, or up_axis to the one that is up in the room'
             )
         x, y = basis @ np.array(pose.position)
         return _Seen(pose.stamp_ns, math.atan2(downhill, normal) + self._offsets[wheel], (float(x), float(y)))

@@ -1,0 +1,96 @@
+"""Motion capture in a recording: as the joint states that the tag tracker makes of both wheels' poses. No ROS."""
+
+from collections.abc import Iterator
+from itertools import groupby, islice
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dcdrw.recordings.joint_batch import JointBatch
+from dcdrw.recordings.leg_recording import find_topic
+from dcdrw.recordings.recording import BATCH, Recording
+from dcdrw.suite.parameter_file import read_parameter_file
+from dcdrw_msgs_py.rig import FRONT, REAR
+from dcdrw_msgs_py.samples import RUN, SECOND, JointSample, PoseSample
+from dcdrw_msgs_py.topics import FRONT_POSE, FRONT_WHEEL, REAR_POSE, REAR_WHEEL
+from dcdrw_tracker.wheels.poses import PosePairs, PoseParams
+from dcdrw_tracker.wheels.wheel_angles import WheelAngles
+from dcdrw_tracker.wheels.wheel_track import TrackParams
+
+
+class PoseTracking(NamedTuple):
+    """The parameters of tag_tracker, as far as poses concern them."""
+
+    track: TrackParams = TrackParams()
+    bodies: PoseParams = PoseParams()
+
+
+def pose_topics(recording: Recording) -> list[str]:
+    """The topics of both wheels' poses, the front one's first; none unless both were recorded."""
+    names = [name for topic in (FRONT_POSE, REAR_POSE) if (name := find_topic(recording, topic))]
+    return names if len(names) == 2 else []
+
+
+def pose_batches(recording: Recording, rig: Path | None = None) -> Iterator[JointBatch]:
+    """What the tag tracker makes of the poses, and those of no use, as messages that cannot be read.
+
+    Args:
+        recording: an open recording that has `pose_topics`.
+        rig: a parameter file; it takes the place of what was recorded.
+
+    Raises:
+        ValueError, OSError: of the parameter files.
+
+    """
+    params = PoseTracking()
+    for file in filter(None, (recording.parameters, rig)):
+        params = read_parameter_file(file, params)
+    for kind, group in groupby(_followed(recording, params), _kind):
+        while part := list(islice(group, BATCH)):
+            yield _unread(kind, len(part)) if isinstance(kind, str) else _joints(part, kind)
+
+
+def _kind(found: JointSample | str) -> int | str:
+    """What the messages of one batch have in common: the run, or why they are of no use."""
+    return found if isinstance(found, str) else found.run
+
+
+def _followed(recording: Recording, params: PoseTracking) -> Iterator[JointSample | str]:
+    """Joint states, and in the place of poses that are of no use why."""
+    from rosbags.typesys import Stores, get_typestore
+
+    types = get_typestore(Stores.ROS2_JAZZY)
+    pairs, angles = PosePairs(params.bodies, params.track.slope), WheelAngles(params.track)
+    wheels = dict(zip(pose_topics(recording), (FRONT, REAR), strict=True))
+    for topic, _, data in recording.messages(list(wheels)):
+        try:
+            views = pairs.take(wheels[topic], _pose(types.deserialize_cdr(data, FRONT_POSE.type)))
+        except ValueError as error:
+            yield f'{topic}: {error}'
+            continue
+        yield from filter(None, map(angles.update, views))
+
+
+def _pose(message: Any) -> PoseSample:
+    stamp, place, turn = message.header.stamp, message.pose.position, message.pose.orientation
+    return PoseSample(
+        int(stamp.sec) * SECOND + int(stamp.nanosec), (place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)
+    )
+
+
+def _joints(samples: list[Any], run: int) -> JointBatch:
+    turns = np.array([(*sample.front, *sample.rear) for sample in samples])
+    return JointBatch(
+        f'{RUN}{run}',
+        (FRONT_WHEEL, REAR_WHEEL),
+        np.array([sample.stamp_ns for sample in samples], np.int64),
+        turns[:, ::2],
+        turns[:, 1::2],
+        np.full((len(samples), 2), np.nan),
+    )
+
+
+def _unread(why: str, count: int) -> JointBatch:
+    none = np.empty((count, 0))
+    return JointBatch('', (), np.zeros(count, np.int64), none, none, none, why)

@@ -1,0 +1,70 @@
+"""`dcdrw analyze` on recordings that hold nothing but the poses of both wheels."""
+
+import math
+
+import pytest
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from dcdrw.cli import main
+from dcdrw.trials.results import read_trial
+from dcdrw_msgs_py.topics import FRONT_POSE, REAR_POSE
+from tests.bags import TYPES
+from tests.tracker.walking import ALPHA, PITCH, START_NS, walk
+from tests.tracker.wheels.test_poses import streams, y_up
+
+
+def pose_bag(path, poses, namespace='/mocap'):
+    """A recording of poses, as rosbag2 makes it."""
+    kind = {name: TYPES.types[name] for name in (FRONT_POSE.type, 'geometry_msgs/msg/Pose', 'std_msgs/msg/Header')}
+    time, point, turn = (
+        TYPES.types[name]
+        for name in ('builtin_interfaces/msg/Time', 'geometry_msgs/msg/Point', 'geometry_msgs/msg/Quaternion')
+    )
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        topics = {
+            wheel: writer.add_connection(f'{namespace}/{topic.name}', topic.type, typestore=TYPES)
+            for wheel, topic in (('front', FRONT_POSE), ('rear', REAR_POSE))
+        }
+        for wheel, pose in poses:
+            message = kind[FRONT_POSE.type](
+                kind['std_msgs/msg/Header'](time(*divmod(pose.stamp_ns, 10**9)), 'room'),
+                kind['geometry_msgs/msg/Pose'](point(*pose.position), turn(*pose.orientation)),
+            )
+            log_ns = pose.stamp_ns or START_NS
+            writer.write(topics[wheel], log_ns, bytes(TYPES.serialize_cdr(message, FRONT_POSE.type)))
+    return path
+
+
+def test_a_recording_of_poses_alone_is_judged(tmp_path):
+    truth = walk(8.0, 120.0)
+    trial, agreement = read_trial(pose_bag(tmp_path / 'bag', streams(truth)))
+    assert not agreement
+    assert len(trial.motion.stamp_ns) > truth.time.size - 10
+    assert trial.motion.phi[-1] == pytest.approx(truth.phase()[-1] * PITCH, abs=1e-3)
+    assert 100.0 * trial.status.initial_phase == pytest.approx(21.6, abs=1.0)
+    assert trial.status.steps == pytest.approx(truth.steps()[0][-1], abs=1)
+    assert math.degrees(ALPHA) == pytest.approx(15.0)
+
+
+def test_poses_of_no_use_are_counted_and_said(tmp_path, capsys):
+    poses = streams(walk(4.0, 120.0))
+    hidden = [
+        (
+            wheel,
+            pose
+            if k < 400 or wheel == 'rear'
+            else poses[400 - (poses[400][0] == 'rear')][1]._replace(stamp_ns=pose.stamp_ns),
+        )
+        for k, (wheel, pose) in enumerate(poses)
+    ]
+    trial, _ = read_trial(pose_bag(tmp_path / 'hidden', hidden))
+    assert trial.estimator.refusals['unreadable'] > 100
+    unstamped = [(wheel, pose._replace(stamp_ns=0)) for wheel, pose in poses]
+    assert main(['analyze', str(pose_bag(tmp_path / 'unstamped', unstamped))]) == 2
+    assert 'the stamps are zero' in capsys.readouterr().err
+    turned = [(wheel, y_up(pose)) for wheel, pose in poses]
+    assert main(['analyze', str(pose_bag(tmp_path / 'turned', turned))]) == 2
+    assert 'up_axis' in capsys.readouterr().err
+    rig = tmp_path / 'rig.yaml'
+    rig.write_text("tag_tracker:\n  ros__parameters:\n    up_axis: 'y'\n")
+    assert main(['analyze', str(tmp_path / 'turned'), '--rig', str(rig)]) == 0
