@@ -22,10 +22,12 @@ class LoneWheels:
         self._log_ns: list[int] = []
         self.unstamped = 0
         """Messages without a stamp, to which the time of recording was given."""
+        self.missing = ''
+        """Which wheel the last message lacked, and what it names."""
 
     @property
     def unpaired(self) -> int:
-        """Messages of the front wheel to which none of the rear one belongs."""
+        """Messages of a wheel to which none of the other one belongs."""
         return self._pairs.unpaired
 
     def belongs(self, batch: JointBatch) -> bool:
@@ -35,6 +37,8 @@ class LoneWheels:
     def take(self, batch: JointBatch) -> JointBatch | None:
         """Take a batch; returns the joint states that are complete, once there are enough."""
         name = next(name for name in self._names if name in batch.names)
+        other = next(name for name in self._names if name not in batch.names)
+        self.missing = f'joint {other} is missing; the message names {", ".join(batch.names)}'
         column = batch.names.index(name)
         rows = zip(batch.stamp_ns.tolist(), batch.position[:, column], batch.velocity[:, column], strict=True)
         times = batch.log_ns.tolist() or [0] * batch.messages

@@ -268,6 +268,8 @@ class _Trial:
             self._take(rest)
         if self._lone.unpaired:
             self._estimator.refuse('unpaired', self._lone.unpaired)
+        if self._lone.missing and not self._rows:
+            self._unreadable = self._lone.missing
         self._estimator.note_unstamped(self._lone.unstamped)
         motion = (
             Motion(*(np.concatenate(column) for column in zip(*self._parts, strict=True)))

@@ -17,7 +17,7 @@ class WheelPairs:
         self._front: deque[LoneWheel] = deque()
         self._rear: deque[LoneWheel] = deque()
         self.unpaired = 0
-        """Messages of the front wheel to which none of the rear one belongs, so far."""
+        """Messages of a wheel to which none of the other one belongs, so far."""
 
     def take(self, wheel: LoneWheel) -> list[JointSample]:
         """Take the next message of a wheel; returns the samples that it completes, in order."""
@@ -26,7 +26,12 @@ class WheelPairs:
             queue.clear()  # the stream has started anew
         elif queue and wheel.stamp_ns == queue[-1].stamp_ns:
             queue.pop()
+            self.unpaired += 1
         queue.append(wheel)
+        waiting = self._rear
+        while len(waiting) > 2 and waiting[-1].stamp_ns - waiting[1].stamp_ns > LONGEST_PAUSE_NS:
+            waiting.popleft()
+            self.unpaired += 1
         samples = []
         while self._front and not self._awaited(self._front[0].stamp_ns):
             front = self._front.popleft()

@@ -9,6 +9,7 @@ from std_msgs.msg import Float64, Int32
 from dcdrw_msgs_py.diagnosis import Diagnosis
 from dcdrw_msgs_py.messages import JointSampleReader, PhaseSampleWriter, footfall_message
 from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run
+from dcdrw_msgs_py.rig import FRONT
 from dcdrw_msgs_py.samples import LoneWheel
 from dcdrw_msgs_py.topics import FOOTFALLS, JOINT_STATES, PHASE_STATE, PHI, STEP_DIFFERENCE
 from dcdrw_tracker.gait.diagnostics import diagnose_phase
@@ -28,6 +29,7 @@ class PhaseEstimatorNode(Node):
         params = parameters.value
         self._estimator = PhaseEstimator(params)
         self._reader = JointSampleReader(params.front_joint, params.rear_joint, params.coupler_joint)
+        self._joints = params.front_joint, params.rear_joint
         self._pairs = WheelPairs()
         self._writer = PhaseSampleWriter()
         self._phase = advertise(self, PHASE_STATE)
@@ -51,6 +53,11 @@ class PhaseEstimatorNode(Node):
             samples = self._pairs.take(read)
             if missing := self._pairs.unpaired - unpaired:
                 self._estimator.refuse('unpaired', missing)
+                other = self._joints[read.wheel == FRONT]
+                self.get_logger().warning(
+                    f'joint_states: joint {other} is missing; the message names {", ".join(message.name)}',
+                    throttle_duration_sec=1.0,
+                )
         else:
             samples = [read]
         now_ns = self.get_clock().now().nanoseconds

@@ -72,3 +72,11 @@ def test_a_stream_that_starts_anew_is_joined_on() -> None:
     samples = walk(2.0).samples()
     found, _ = joined(lone(samples) + lone(samples))
     assert len(found) > 2 * len(samples) - 30
+
+
+@pytest.mark.parametrize('wheel', [FRONT, REAR])
+def test_a_wheel_whose_other_one_never_comes_is_counted_and_not_kept(wheel: str) -> None:
+    pairs = WheelPairs()
+    alone = [one for one in lone(walk(4.0).samples()) if one.wheel == wheel]
+    assert not [sample for one in alone for sample in pairs.take(one)]
+    assert pairs.unpaired > len(alone) - 30

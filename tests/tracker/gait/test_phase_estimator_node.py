@@ -98,7 +98,7 @@ def test_missing_joint_is_named_and_counted(bench):
         publisher.publish(joints(bench, 0, ('front_wheel', 'elbow')))
         bench.spin(0.05)
         values = {pair.key: pair.value for message in diagnostics for pair in message.status[0].values}
-        return int(values.get('samples refused: unreadable', 0)) > 0
+        return int(values.get('samples refused: unpaired', 0)) > 0
 
     bench.wait(counted, 'a diagnosis that counts the messages')
     assert 'joint rear_wheel is missing; the message names front_wheel, elbow' in bench.output('phase_estimator')
