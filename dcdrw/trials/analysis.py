@@ -16,11 +16,16 @@ from dcdrw.suite.parameter_file import TrialParams
 from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.rolling import phi_pitch
 from dcdrw_msgs_py.samples import SECOND, CouplerSample, Footfall, JointSample, PhaseSample, Turn, run_of
+from dcdrw_tracker.gait.cadence import GAP
 from dcdrw_tracker.gait.pair_state import judge
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseStatus
 from dcdrw_tracker.gait.rest import moves
 from dcdrw_tracker.gait.sync import SyncMonitor, SyncStatus
 
+SHORTEST_GAP_NS = 20_000_000
+"""Over less, nothing happens that a curve would hide [ns]."""
+USUAL = 0.9
+"""So large a share of the intervals between samples is no longer than the usual one: also where they come in bursts."""
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -65,6 +70,16 @@ class Motion(NamedTuple):
     def seconds(self) -> Floats:
         """Time since the first row [s]."""
         return np.asarray((self.stamp_ns - self.stamp_ns[:1]) / SECOND)
+
+    @property
+    def gaps(self) -> Integers:
+        """Rows before which samples are missing for long enough to be seen, or with which the source began anew."""
+        intervals = np.diff(self.stamp_ns)
+        if not len(intervals):
+            return np.empty(0, np.int64)
+        shortest = max(GAP * np.quantile(intervals, USUAL), SHORTEST_GAP_NS)
+        cut = (intervals > shortest) | (intervals <= 0) | (np.diff(self.restarts) != 0)
+        return np.flatnonzero(cut) + 1
 
 
 class Analysis(NamedTuple):

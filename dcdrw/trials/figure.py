@@ -1,96 +1,140 @@
 """The picture of a trial: stance angles, phase difference, gait diagram and coupler force against time."""
 
 import math
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from textwrap import wrap
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from dcdrw.trials.analysis import Analysis, Floats
+from dcdrw.trials.analysis import Analysis, Floats, Motion
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_sim.figures.style import BAND, BLACK, WHEELS, new_figure, save
 
+TITLE_WIDTH = 100
+"""Of a line of the title [characters]."""
 _FORCE = '#555555'
 
 
 def draw_trial(trial: Analysis, title: str, path: Path) -> None:
     """Draw a trial into a PNG, PDF or SVG file, by the ending of its name.
 
+    Where samples are missing, curves and stances break and footfalls are left out.
+
     Raises:
         ValueError: matplotlib is not installed.
 
     """
-    figure = new_figure(10, 9)
-    angles, phase, gait, force = figure.subplots(4, 1, sharex=True, height_ratios=(3, 3, 1.3, 2))
-    time = trial.motion.seconds
-    _draw_angles(angles, trial, time)
-    _draw_phase(phase, trial, time)
-    _draw_gait(gait, trial, time)
-    _draw_force(force, trial, time)
-    force.set_xlabel('time [s]')
-    if len(time):
-        force.set_xlim(0.0, max(float(time[-1]), 1e-3))
-    figure.suptitle(title, wrap=True)
-    for axes in (angles, phase, gait, force):
+    course = _Course.of(trial)
+    force_known = bool(np.isfinite(course.motion.coupler_force).any())
+    figure = new_figure(10, 9 if force_known else 7.4)
+    panels = 4 if force_known else 3
+    angles, phase, gait, *force = figure.subplots(panels, 1, sharex=True, height_ratios=(3, 3, 1.3, 2)[:panels])
+    _draw_angles(angles, course)
+    _draw_phase(phase, course)
+    _draw_gait(gait, course)
+    for axes in force:
+        _draw_force(axes, course)
+    last = force[0] if force else gait
+    last.set_xlabel('time [s]')
+    if len(course.time):
+        last.set_xlim(0.0, max(float(course.time[-1]), 1e-3))
+    for axes in (angles, phase, gait, *force):
         axes.spines[['top', 'right']].set_visible(False)
+        _shade_gaps(axes, course)
+    figure.suptitle(_in_lines(title))
     figure.align_ylabels()
     save(figure, path)
 
 
+class _Course(NamedTuple):
+    """What of a trial is drawn: all of it, or where the stamps went back, the run that is judged."""
+
+    trial: Analysis
+    motion: Motion
+    time: Floats
+    """[s]"""
+    pieces: list[tuple[float, float]]
+    """Times between which no sample is missing [s]."""
+
+    @classmethod
+    def of(cls, trial: Analysis) -> '_Course':
+        motion = trial.motion
+        if (np.diff(motion.stamp_ns) <= 0).any():
+            motion = motion.rows(motion.restarts == motion.restarts[-1])
+        time = motion.seconds
+        edges = pairwise([0, *motion.gaps.tolist(), len(time)])
+        return cls(trial, motion, time, [(time[first], time[last - 1]) for first, last in edges if last > first])
+
+    @property
+    def step(self) -> float:
+        """φ of a whole step [°]."""
+        return math.degrees(self.trial.pitch)
+
+    def line(self, values: Floats, jump: float = math.inf) -> tuple[Floats, Floats]:
+        """Time and values of a curve, cut where samples are missing, and where it jumps by more than this."""
+        cuts = np.union1d(self.motion.gaps, np.flatnonzero(np.abs(np.diff(values)) > jump) + 1)
+        return np.insert(self.time, cuts, math.nan), np.insert(values, cuts, math.nan)
+
+    def falls(self, wheel: str) -> list[tuple[float, int]]:
+        """Time [s] and number of each footfall of a wheel that was seen."""
+        start = self.motion.stamp_ns[0] if len(self.time) else 0
+        falls = [
+            (float(fall.stamp_ns - start) / SECOND, fall.steps) for fall in self.trial.footfalls if fall.wheel == wheel
+        ]
+        return [(second, steps) for second, steps in falls if any(begin <= second <= end for begin, end in self.pieces)]
+
+
+def _in_lines(title: str) -> str:
+    """Lines of about one length."""
+    lines = len(title) // TITLE_WIDTH + 1
+    return '\n'.join(wrap(title, max(len(title) // lines + 10, 1)))
+
+
+def _shade_gaps(axes: Any, course: _Course) -> None:
+    gaps = [(end, begin - end) for (_, end), (begin, _) in pairwise(course.pieces)]
+    axes.broken_barh(gaps, (0.0, 1.0), transform=axes.get_xaxis_transform(), color='0.5', alpha=0.16, zorder=0)
+
+
 def _legend(axes: Any) -> None:
-    axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False, borderaxespad=0.1)
+    axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=4, frameon=False, borderaxespad=0.1)
 
 
-def _second(trial: Analysis, stamp_ns: int) -> float:
-    return float(stamp_ns - trial.motion.stamp_ns[0]) / SECOND
-
-
-def _broken(angle: Floats, step: float) -> Floats:
-    """The angle in degrees, cut where it wraps: a strike is a jump, not a motion."""
-    degrees = np.degrees(angle)
-    degrees[np.abs(np.diff(degrees, prepend=degrees[:1])) > step / 2] = math.nan
-    return degrees
-
-
-def _draw_angles(axes: Any, trial: Analysis, time: Floats) -> None:
-    motion = trial.motion
+def _draw_angles(axes: Any, course: _Course) -> None:
+    motion = course.motion
     for wheel, theta, name in ((FRONT, motion.theta1, 'θ₁ front'), (REAR, motion.theta2, 'θ₂ rear')):
         axes.plot(
-            time,
-            _broken(theta, math.degrees(trial.pitch)),
+            *course.line(np.degrees(theta), course.step / 2),  # a strike is a jump, not a motion
             color=WHEELS[wheel],
             label=name,
             linewidth=1.3,
             linestyle='-' if wheel == FRONT else '--',
         )
+    if len(course.pieces) > 1:
+        axes.fill_between([], [], color='0.5', alpha=0.25, linewidth=0, label='no samples')
     axes.axhline(0.0, color='0.85', zorder=0, linewidth=0.8)
     axes.set_ylabel('stance angle [°]')
     _legend(axes)
 
 
-def _draw_phase(axes: Any, trial: Analysis, time: Floats) -> None:
-    step = math.degrees(trial.pitch)
-    band = trial.params.sync.band_percent / 100.0 * step
+def _draw_phase(axes: Any, course: _Course) -> None:
+    step, params = course.step, course.trial.params.sync
+    band = params.band_percent / 100.0 * step
     axes.axhspan(
         step / 2 - band,
         step / 2 + band,
         color=BAND,
         alpha=0.18,
         linewidth=0,
-        label=f'±{trial.params.sync.band_percent:g} % of 50 %',
+        label=f'±{params.band_percent:g} % of 50 %',
     )
     axes.axhline(step / 2, color=BAND, linewidth=1)
-    axes.plot(time, _broken(trial.motion.phi, step), color=BLACK, linewidth=1.3, label='φ')
-    for fall in trial.footfalls:
-        if fall.wheel == FRONT and fall.steps == trial.status.steps_to_synchronization:
-            axes.axvline(
-                _second(trial, fall.stamp_ns),
-                color=BAND,
-                linestyle=':',
-                linewidth=1.5,
-                label=f'from step {fall.steps} on',
-            )
+    axes.plot(*course.line(np.degrees(course.motion.phi), step / 2), color=BLACK, linewidth=1.3, label='φ')
+    entered = course.trial.status.steps_to_synchronization
+    for second in [second for second, steps in course.falls(FRONT) if steps == entered][-1:]:
+        axes.axvline(second, color=BAND, linestyle=':', linewidth=1.5, label=f'from step {entered} on')
     axes.set_ylim(0.0, step)
     axes.set_ylabel('phase difference φ [°]')
     percent = axes.secondary_yaxis('right', functions=(lambda deg: deg / step * 100, lambda p: p / 100 * step))
@@ -98,26 +142,21 @@ def _draw_phase(axes: Any, trial: Analysis, time: Floats) -> None:
     _legend(axes)
 
 
-def _draw_gait(axes: Any, trial: Analysis, time: Floats) -> None:
+def _draw_gait(axes: Any, course: _Course) -> None:
     """Each bar is one stance, from a footfall to the next of that wheel; the legs alternate in shade."""
-    end = float(time[-1]) if len(time) else 0.0
     for row, wheel in enumerate((REAR, FRONT)):
-        falls = [(0.0, 0)] + [
-            (_second(trial, fall.stamp_ns), fall.steps) for fall in trial.footfalls if fall.wheel == wheel
-        ]
-        for (begin, steps), (until, _) in zip(falls, [*falls[1:], (end, 0)], strict=True):
-            axes.barh(
-                row,
-                until - begin,
-                left=begin,
-                height=0.6,
-                color=WHEELS[wheel],
-                alpha=0.85 if steps % 2 else 0.35,
-                linewidth=0,
-            )
+        falls = course.falls(wheel)
+        stances: tuple[list[tuple[float, float]], ...] = [], []
+        for start, stop in course.pieces:
+            inside = [(second, steps) for second, steps in falls if start <= second <= stop]
+            first = inside[0][1] - 1 if inside else max([steps for second, steps in falls if second < start], default=0)
+            for (begin, steps), (until, _) in pairwise([(start, first), *inside, (stop, 0)]):
+                stances[steps % 2].append((begin, until - begin))
+        for bars, alpha in zip(stances, (0.35, 0.85), strict=True):
+            axes.broken_barh(bars, (row - 0.3, 0.6), color=WHEELS[wheel], alpha=alpha, linewidth=0)
         axes.plot(
-            [time for time, _ in falls[1:]],
-            [row + 0.42] * (len(falls) - 1),
+            [second for second, _ in falls],
+            [row + 0.42] * len(falls),
             'v',
             color=WHEELS[wheel],
             markersize=4,
@@ -128,11 +167,7 @@ def _draw_gait(axes: Any, trial: Analysis, time: Floats) -> None:
     axes.set_ylabel('stances')
 
 
-def _draw_force(axes: Any, trial: Analysis, time: Floats) -> None:
-    known = ~np.isnan(trial.motion.coupler_force)
+def _draw_force(axes: Any, course: _Course) -> None:
     axes.axhline(0.0, color='0.85', zorder=0, linewidth=0.8)
     axes.set_ylabel('coupler force [N]')
-    if known.any():
-        axes.plot(time[known], trial.motion.coupler_force[known], color=_FORCE, linewidth=1.0)
-    else:
-        axes.text(0.5, 0.5, 'the source does not tell the coupler force', transform=axes.transAxes, ha='center')
+    axes.plot(*course.line(course.motion.coupler_force), color=_FORCE, linewidth=1.0)
