@@ -24,6 +24,7 @@ CONTRACTION = 'per-step convergence ratio'
 RATE_IN, AGE = 'rate in [Hz]', 'age of the last sample [s]'
 GAPS, LOST_SAMPLES, LONGEST_GAP = 'gaps', 'samples lost', 'longest gap [s]'
 RESTARTS = 'restarts of the source'
+REFUSED = 'samples refused'
 
 
 def messages_of(topic: str) -> str:

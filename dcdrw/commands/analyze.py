@@ -6,15 +6,15 @@ from pathlib import Path
 
 from dcdrw.files import add_force, free_folder
 from dcdrw.trials.results import describe, read_trial, write_results
-from dcdrw.trials.summary import sentence
+from dcdrw.trials.summary import summarize
 from dcdrw_msgs_py.topics import JOINT_STATES
 
 _EPILOG = """\
 A recording is the folder of one, or that of a trial, or a file of one (.mcap or .db3, compressed or not), by this suite
 or by ros2 bag record.
 The parameters are those that were recorded, or the defaults, and what --rig changes. Without --out, nothing is
-written. Exit status: 0 all were analyzed, 1 one of several could not be or is damaged in parts, which are left out,
-2 wrong input.
+written. Exit status: 0 each was judged by all that it holds, 1 a verdict rests on less, or nothing was run (the
+sentence says why), or one of several could not be read, 2 wrong input.
 """
 
 
@@ -68,9 +68,10 @@ def run(options: argparse.Namespace) -> int:
             continue
         for text in (*trial.damage, *trial.notes):
             print(f'dcdrw analyze: {text}', file=sys.stderr)
-        status = 1 if trial.damage else status
+        summary = summarize(trial)
+        status = status if summary.complete else 1
         prefix = f'{path}: ' if several else ''
-        print(prefix + sentence(trial))
+        print(prefix + summary.sentence)
         for topic, (recorded, equal) in agreements.items():
             print(f'{prefix}{topic}: {equal} of {recorded} recorded are the same here to the last bit')
         if folder:

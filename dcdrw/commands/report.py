@@ -16,6 +16,9 @@ or by ros2 bag record.
 The page holds its pictures itself and needs no network. Beside it, in the folder REPORT.csv: trials.csv (a row for
 each trial), steps.csv (a row for each footfall) and samples.csv (all).
 
+Exit status: 0 each recording was judged by all that it holds, 1 one could not be read, holds no trial that was run, or
+has a verdict that rests on less: the page says why, 2 none could be read.
+
 example:
   dcdrw report trials/* --out today.html
 """
@@ -75,5 +78,5 @@ def run(options: argparse.Namespace) -> int:
     write_csv(tables / 'samples.csv', ('trial', *columns), samples, options.force)
     write_text(options.out, text, options.force)
     print(f'Written: {options.out} and {tables}/')
-    whole = len(trials) == len(options.recordings) and not any(trial.analysis.damage for trial in trials)
+    whole = len(trials) == len(options.recordings) and all(trial.summary.complete for trial in trials)
     return 0 if whole else 1

@@ -19,7 +19,7 @@ from dcdrw.suite.processes import free_domain
 from dcdrw.trials.filmed_rig import filmed_rig
 from dcdrw.trials.results import describe, write_results
 from dcdrw.trials.simulated import Course, SimulatedTrial
-from dcdrw.trials.summary import sentence
+from dcdrw.trials.summary import summarize
 from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.quantity import check
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 _EPILOG = """\
 The nodes run on a free ROS domain that only this machine sees, unless --domain names one. DIR gets the
 recording (for ros2 bag, dcdrw replay and dcdrw analyze), summary.json, trial.png, samples.csv, footfalls.csv and what
-each node printed. Exit status: 0 the trial ran to its end (whether
-or not the pair fell into step: see the summary), 1 a node died or no data came, 2 wrong input, 130 interrupted.
+each node printed. Exit status: 0 the trial ran to its end (whether or not the pair fell into step: see the summary),
+1 a node died, no data came, or the verdict rests on less than was recorded, 2 wrong input, 130 interrupted.
 
 With --camera, joint_states come from pictures, as from a real rig: simulator, virtual_camera and tag_tracker run in a
 row. Where the camera stands and what its pictures are like are parameters of virtual_camera, in the file of --rig.
@@ -147,7 +147,8 @@ class _Screen(LiveLine):
 def _finish(course: Course, folder: Path) -> int:
     """Say and write what the trial came to; returns the exit status."""
     failure, trial, truth = course.failure, course.analysis, course.truth
-    print(sentence(trial))
+    summary = summarize(trial)
+    print(summary.sentence)
     if truth:
         print(truth)
     try:
@@ -168,4 +169,6 @@ def _finish(course: Course, folder: Path) -> int:
         failure = failure or f'{error.strerror}: {folder}'
     if failure:
         print(f'dcdrw trial: {failure}', file=sys.stderr)
-    return interrupted_status(course.interrupted) if course.interrupted else 1 if failure else 0
+    if course.interrupted:
+        return interrupted_status(course.interrupted)
+    return 0 if summary.complete and not failure else 1

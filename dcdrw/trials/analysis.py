@@ -16,7 +16,7 @@ from dcdrw.suite.parameter_file import TrialParams
 from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.rolling import phi_pitch
 from dcdrw_msgs_py.samples import SECOND, CouplerSample, Footfall, JointSample, PhaseSample, Turn, run_of
-from dcdrw_tracker.gait.cadence import GAP
+from dcdrw_tracker.gait.cadence import GAP, CadenceStatus
 from dcdrw_tracker.gait.pair_state import judge
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseStatus
 from dcdrw_tracker.gait.rest import moves
@@ -24,6 +24,8 @@ from dcdrw_tracker.gait.sync import SyncMonitor, SyncStatus
 
 SHORTEST_GAP_NS = 20_000_000
 """Over less, nothing happens that a curve would hide [ns]."""
+LEARNED = 100
+"""Samples after which the estimator knows their cadence."""
 USUAL = 0.9
 """So large a share of the intervals between samples is no longer than the usual one: also where they come in bursts."""
 Floats = NDArray[np.float64]
@@ -91,9 +93,16 @@ class Analysis(NamedTuple):
     held: Motion
     """Before that."""
     footfalls: tuple[Footfall, ...]
+    judged: int
+    """The row of `motion` with which the part begins that is judged: 0, or where judgement last had to begin anew."""
+    judged_footfalls: tuple[Footfall, ...]
+    """Those of that part."""
     status: SyncStatus
     """Of a monitor that saw `motion`."""
     estimator: PhaseStatus
+    """Of an estimator that saw all, also what came before `motion`."""
+    cadence: CadenceStatus
+    """Of the joint states, from the first of `motion` on: what never came, or was not recorded."""
     joint_states: int
     """Messages, from the first of `motion` on; those that were refused included."""
     unreadable: str
@@ -111,7 +120,7 @@ class Analysis(NamedTuple):
     @property
     def state(self) -> PairState:
         """What the pair did in the end. Wheels that are held after they have walked take nothing back."""
-        return judge(self.status._replace(held=self.status.held and not self.footfalls))
+        return judge(self.status._replace(held=self.status.held and not self.judged_footfalls))
 
     @property
     def ran(self) -> bool:
@@ -122,7 +131,8 @@ class Analysis(NamedTuple):
     def why_not_run(self) -> str:
         """What was there in the place of a trial; empty where it ran."""
         if self.state is PairState.HELD:
-            return f'the wheels were held for the {self.motion.seconds[-1]:.1f} s that were recorded'
+            seconds = self.motion.rows(slice(self.judged, None)).seconds
+            return f'the wheels were held for the {seconds[-1]:.1f} s that were recorded'
         if self.state is not PairState.NO_DATA:
             return ''
         if self.unreadable:
@@ -164,6 +174,8 @@ class _Trial:
         self._held = self._received = 0
         self._rows = 0
         self._footfalls: list[Footfall] = []
+        self._restarts = self._judged = self._first_footfall = 0
+        self._before = self._estimator.status().cadence
         self._parts: list[list[Any]] = []
         self._last: PhaseSample | None = None
         self._unreadable = ''
@@ -255,6 +267,8 @@ class _Trial:
                 if not self._moving and moves(one):
                     self._let_go(place, len(taken))
                 sync = self._monitor.update(one)
+                if self._monitor.restarts != self._restarts:
+                    self._begin_anew(len(taken))
                 self._last = one
                 taken.append(place)
                 phases.append(one)
@@ -269,12 +283,28 @@ class _Trial:
     def _let_go(self, row: int, taken: int) -> None:
         self._moving = True
         self._monitor = SyncMonitor(self._params.sync)
+        self._restarts = self._first_footfall = 0
+        if self._rows + taken > LEARNED:
+            self._before = self._estimator.status().cadence
         self._received = -row
         self._footfalls.clear()
         if self._last:
             self._monitor.update(self._last)
             self._received += 1
             self._held = self._rows + taken - 1
+        self._judged = self._held
+
+    def _begin_anew(self, taken: int) -> None:
+        """The monitor has begun anew: what came before is judged no more."""
+        self._restarts = self._monitor.restarts
+        self._judged = self._rows + taken
+        self._first_footfall = len(self._footfalls)
+
+    def _cadence(self, stamp_ns: Integers) -> CadenceStatus:
+        """Of the estimator, since the wheels were let go."""
+        now, before = self._estimator.status().cadence, self._before
+        gaps, longest_ns = now.gaps - before.gaps, np.diff(stamp_ns).max(initial=0)
+        return CadenceStatus(now.rate, gaps, now.lost - before.lost, float(longest_ns) * 1e-9 if gaps else 0.0)
 
     def result(self) -> Analysis:
         """All that there is."""
@@ -296,8 +326,11 @@ class _Trial:
             motion.rows(slice(self._held, None)),
             motion.rows(slice(self._held)),
             tuple(self._footfalls),
+            self._judged - self._held,
+            tuple(self._footfalls[self._first_footfall :]),
             self._monitor.status(),
             self._estimator.status(),
+            self._cadence(motion.stamp_ns[self._held :]),
             self._received,
             self._unreadable,
         )

@@ -100,7 +100,7 @@ def _cell(value: Any) -> Any:
 def step_rows(trial: RecordedTrial) -> Iterable[tuple[Any, ...]]:
     """Every footfall, with the error at those of the front wheel."""
     errors = iter(trial.analysis.status.history)
-    for fall in trial.analysis.footfalls:
+    for fall in trial.analysis.judged_footfalls:
         error = next(errors, math.nan) if fall.wheel == FRONT else math.nan
         yield (
             trial.name,

@@ -6,18 +6,34 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dcdrw.trials.analysis import Analysis
+from dcdrw.trials.remarks import Remark, remarks
 from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import FRONT
+from dcdrw_tracker.gait.phase import ClockStep, Hint, Refusal, Restart
 
 
 class Samples(NamedTuple):
     """What came of the messages of a trial."""
 
     joint_states: int
+    """From the moment on that the wheels were let go, those that were refused included."""
     phase_state: int
     gaps: int
     lost: int
+    longest_gap_s: float | None
+    refused: dict[Refusal, int]
+    """By the reason; of all that were recorded, as everything below."""
+    restarts: tuple[Restart, ...]
+    """Of the source."""
+    clock_steps: tuple[ClockStep, ...]
+    """Times that the clock of the source was set, which are undone."""
+    unstamped: int
+    """Without a stamp, so that the time of recording took its place."""
+    rollovers: int
+    """Times that the counter of an encoder rolled over, which is made good."""
+    hints: tuple[Hint, ...]
+    """Parameters that seem to be wrong."""
 
 
 class Summary(NamedTuple):
@@ -28,6 +44,12 @@ class Summary(NamedTuple):
     """What the pair did in the end."""
     reason: str | None
     """Why there is no verdict; None where there is one."""
+    remarks: tuple[Remark, ...]
+    """What the verdict leaves out, and what had to be made good for it."""
+    complete: bool
+    """The verdict rests on all that was recorded."""
+    judged_from_s: float
+    """Where the part begins that is judged, from the moment on that the wheels were let go."""
     synchronized: bool | None
     initial_phase_percent: float | None
     """Of a step, as every phase but the next but one."""
@@ -59,10 +81,14 @@ def summarize(trial: Analysis) -> Summary:
     status, seconds, state = trial.status, trial.motion.seconds, trial.state
     synchronized = state is PairState.SYNCHRONIZED
     low, high = final_band(trial)
+    said = remarks(trial)
     return Summary(
         sentence=sentence(trial),
         state=state,
         reason=trial.why_not_run or None,
+        remarks=said,
+        complete=trial.ran and not trial.damage and not any(remark.rests_on_less for remark in said),
+        judged_from_s=float(seconds[trial.judged]) if trial.judged else 0.0,
         synchronized=synchronized if trial.ran else None,
         initial_phase_percent=_known(100.0 * status.initial_phase),
         final_phase_percent=_known(100.0 * status.phase),
@@ -79,14 +105,31 @@ def summarize(trial: Analysis) -> Summary:
         losses_of_synchronization=status.losses,
         stalled=status.stalled,
         duration_s=_known(seconds[-1]) if len(seconds) else 0.0,
-        samples=Samples(trial.joint_states, len(seconds), status.cadence.gaps, status.cadence.lost),
+        samples=Samples(
+            joint_states=trial.joint_states,
+            phase_state=len(seconds),
+            gaps=trial.cadence.gaps,
+            lost=trial.cadence.lost,
+            longest_gap_s=_known(trial.cadence.longest),
+            refused=trial.estimator.refusals,
+            restarts=trial.estimator.restarted,
+            clock_steps=trial.estimator.clock_steps,
+            unstamped=trial.estimator.unstamped,
+            rollovers=trial.estimator.rollovers,
+            hints=trial.estimator.hints,
+        ),
         damage=trial.damage,
         parameters={name: flatten(values) for name, values in trial.params._asdict().items()},
     )
 
 
 def sentence(trial: Analysis) -> str:
-    """The trial in a sentence."""
+    """The trial in a sentence, and in another each that a reader of it should know."""
+    return ' '.join([verdict(trial), *(remark.text for remark in remarks(trial))])
+
+
+def verdict(trial: Analysis) -> str:
+    """What the pair did, in a sentence."""
     if not trial.ran:
         return f'Not run: {trial.why_not_run}.'
     status, band = trial.status, trial.params.sync.band_percent
@@ -107,8 +150,9 @@ def sentence(trial: Analysis) -> str:
 
 def final_band(trial: Analysis) -> tuple[float, float]:
     """Least and greatest error over the last `hold_steps` steps of the front wheel [%]; NaN without data."""
-    falls = [fall.stamp_ns for fall in trial.footfalls if fall.wheel == FRONT][-trial.params.sync.hold_steps - 1 :]
-    errors = trial.motion.error_percent[trial.motion.stamp_ns >= (falls[0] if falls else 0)]
+    falls = [fall.stamp_ns for fall in trial.judged_footfalls if fall.wheel == FRONT]
+    part = trial.motion.rows(slice(trial.judged, None))
+    errors = part.error_percent[part.stamp_ns >= (falls[-trial.params.sync.hold_steps - 1 :] or [0])[0]]
     if np.isnan(errors).all():
         return math.nan, math.nan
     return float(np.nanmin(errors)), float(np.nanmax(errors))

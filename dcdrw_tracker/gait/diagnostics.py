@@ -15,6 +15,7 @@ from dcdrw_msgs_py.diagnosis import (
     PHASE,
     PHASE_OF_STRIDE,
     RATE_IN,
+    REFUSED,
     RESTARTS,
     STATE,
     STEP_DIFFERENCE,
@@ -27,7 +28,7 @@ from dcdrw_msgs_py.diagnosis import (
 )
 from dcdrw_tracker.gait.cadence import CadenceStatus
 from dcdrw_tracker.gait.pair_state import judge
-from dcdrw_tracker.gait.phase import PhaseStatus, Refusal
+from dcdrw_tracker.gait.phase import Hint, PhaseStatus, Refusal
 from dcdrw_tracker.gait.sync import SyncStatus
 
 
@@ -79,8 +80,12 @@ def diagnose_phase(status: PhaseStatus, age: float, stale_after: float) -> Diagn
             STEP_DIFFERENCE: status.front_steps - status.rear_steps,
             'n is certain': not status.n_uncertain,
             'samples accepted': status.accepted,
-            **{f'samples refused: {why}': count for why, count in status.refused.items()},
+            REFUSED: sum(status.refused.values()),
+            **{f'{REFUSED}: {why}': count for why, count in status.refused.items()},
             RESTARTS: status.restarts,
+            'samples without a stamp': status.unstamped,
+            'times the clock of the source was set': len(status.clock_steps),
+            'times the counter of an encoder rolled over': status.rollovers,
             **_stream(status.cadence, age),
         },
     )
@@ -115,14 +120,22 @@ def _message(state: PairState, status: SyncStatus, age: float) -> str:
 def _judge_phase(status: PhaseStatus, age: float, stale_after: float) -> tuple[Level, str]:
     if not age <= stale_after:
         if status.refusal:
-            return Level.STALE, f'every sample is refused: {_REASONS[status.refusal]}'
+            return Level.STALE, f'every sample is refused: {REFUSALS[status.refusal]}'
         return Level.STALE, _no_sample(age)
+    if status.hints:
+        return Level.WARN, '; '.join(HINTS[hint] for hint in status.hints)
     if status.n_uncertain:
         return Level.WARN, f'n may be off: a gap of up to {status.cadence.longest:.2f} s may hide a step'
     return Level.OK, 'tracking both wheels'
 
 
-_REASONS: dict[Refusal, str] = {
+HINTS: dict[Hint, str] = {
+    'front_sign': 'the front wheel rolls uphill: is its sign right? (parameter front_sign)',
+    'rear_sign': 'the rear wheel rolls uphill: is its sign right? (parameter rear_sign)',
+    'unit': 'the wheels turn faster than they can roll: are their rotations in degrees? (parameter unit)',
+}
+"""What makes a parameter seem wrong."""
+REFUSALS: dict[Refusal, str] = {
     'unreadable': 'a wheel is missing, or the message is malformed (see the parameters front_joint and rear_joint)',
     'unpaired': "each wheel comes in messages of its own, and the rear one's stay away",
     'not finite': 'a rotation is no finite number',
@@ -131,6 +144,7 @@ _REASONS: dict[Refusal, str] = {
     'future': "the stamp lies ahead of this node's clock (do the machines' clocks agree? is use_sim_time the same?)",
     'outlier': 'no wheel turns that fast (see the parameter max_speed)',
 }
+"""Why a sample is refused."""
 
 
 def _no_sample(age: float) -> str:

@@ -162,6 +162,11 @@ class SyncMonitor:
         self._last = phase
         return self._sample(phase)
 
+    @property
+    def restarts(self) -> int:
+        """How often the source has started anew."""
+        return self._restarts
+
     def status(self) -> SyncStatus:
         """A snapshot."""
         last = self._last

@@ -6,7 +6,7 @@ from typing import Any
 from rclpy.node import Node
 from std_msgs.msg import Bool, Float64
 
-from dcdrw_msgs_py.diagnosis import Diagnosis, PairState
+from dcdrw_msgs_py.diagnosis import REFUSED, Diagnosis, PairState
 from dcdrw_msgs_py.messages import PhaseSampleReader
 from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
 from dcdrw_msgs_py.topics import PHASE_STATE, SYNC_ERROR, SYNC_ERROR_PERCENT, SYNCHRONIZED
@@ -74,7 +74,7 @@ class SyncMonitorNode(Node):
 
     def _diagnose(self) -> Diagnosis:
         diagnosis = diagnose_sync(self._monitor.status(), self._age.seconds, self._settings.value.stale_after)
-        return diagnosis._replace(values={**diagnosis.values, 'samples refused': self._unreadable})
+        return diagnosis._replace(values={**diagnosis.values, REFUSED: self._unreadable})
 
 
 def main(args: list[str] | None = None) -> int:

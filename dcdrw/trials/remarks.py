@@ -1,0 +1,92 @@
+"""What the verdict on a trial leaves out, and what had to be made good for it: in words, each with its counts."""
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from dcdrw.trials.analysis import Analysis
+from dcdrw_msgs_py.rig import FRONT, REAR
+from dcdrw_tracker.gait.diagnostics import HINTS, REFUSALS
+from dcdrw_tracker.gait.phase import Restart
+
+
+class Remark(NamedTuple):
+    """What a reader of the verdict should know."""
+
+    text: str
+    """A sentence."""
+    rests_on_less: bool = False
+    """The verdict rests on less than what was recorded."""
+
+
+def remarks(trial: Analysis) -> tuple[Remark, ...]:
+    """All that is to be said beside the verdict; what takes most from it comes first."""
+    return tuple(_remarks(trial))
+
+
+def _remarks(trial: Analysis) -> Iterator[Remark]:
+    estimator, cadence = trial.estimator, trial.cadence
+    for hint in estimator.hints:
+        yield Remark(f'{HINTS[hint][0].upper()}{HINTS[hint][1:]}.', True)
+    if trial.judged:
+        yield Remark(f'{_begun_anew(trial)}; what came before is left out.', True)
+    refused = sum(estimator.refusals.values())
+    if refused:
+        reasons = '; '.join(
+            REFUSALS[why] if count == refused else f'{count} times {REFUSALS[why]}'
+            for why, count in estimator.refusals.items()
+        )
+        of = estimator.accepted + refused
+        yield Remark(f'{refused} of {of} joint states were refused: {reasons}.', True)
+    if cadence.lost:
+        yield Remark(
+            f'By the stamps, {cadence.lost} of {trial.joint_states + cadence.lost} samples are missing, in '
+            f'{_number_of(cadence.gaps, "gap")} of up to {cadence.longest:.3g} s.'
+        )
+    if estimator.n_uncertain:
+        yield Remark('A gap was long enough to hide a step: n may be off.')
+    if estimator.unstamped:
+        yield Remark(
+            f'{_number_of(estimator.unstamped, "joint state")} had no stamp: the time of recording took its place.'
+        )
+    for step in estimator.clock_steps:
+        yield Remark(
+            f'The clock of the source was set by {step.seconds:+.3g} s while the wheels rolled on; '
+            'this is undone, and nothing left out.'
+        )
+    if estimator.rollovers:
+        yield Remark(
+            f'The counter of an encoder rolled over {_number_of(estimator.rollovers, "time")}, which is made good.'
+        )
+
+
+def _begun_anew(trial: Analysis) -> str:
+    """Why and when judgement began anew for the last time."""
+    motion, first = trial.motion, trial.judged
+    before = float(motion.seconds[first - 1])
+    times = trial.status.restarts
+    last = f', for the last of {times} times' if times > 1 else ''
+    restarted = trial.estimator.restarted
+    if motion.restarts[first] != motion.restarts[first - 1] and restarted:
+        return f'The source began anew after {before:.1f} s{last}: {_cause(restarted[-1])}'
+    silence = float(motion.stamp_ns[first] - motion.stamp_ns[first - 1]) * 1e-9
+    if silence > trial.params.sync.stale_after:
+        return f'No sample of use came for {silence:.1f} s after {before:.1f} s{last}, and judgement begins anew there'
+    return f'The wheels jumped after {before:.1f} s{last}, and judgement begins anew there'
+
+
+def _cause(restart: Restart) -> str:
+    if restart.cause == 'announced':
+        return 'it says so itself'
+    if restart.cause == 'stamp':
+        return f'its stamps went {"back" if restart.seconds < 0.0 else "ahead"} by {abs(restart.seconds):.3g} s'
+    jumps = ' and '.join(
+        f'{wheel} by {jump:+.3g} rad'
+        for wheel, jump in ((FRONT, restart.front), (REAR, restart.rear))
+        if math.isfinite(jump)
+    )
+    return f'its rotations jumped ({jumps}), so that they have no common zero with those before'
+
+
+def _number_of(count: int, thing: str) -> str:
+    return f'{count} {thing}{"" if count == 1 else "s"}'
