@@ -21,10 +21,18 @@ _FORCE = '#555555'
 def draw_trial(trial: Analysis, title: str, path: Path) -> None:
     """Draw a trial into a PNG, PDF or SVG file, by the ending of its name.
 
-    Where samples are missing, curves and stances break and footfalls are left out.
-
     Raises:
         ValueError: matplotlib is not installed.
+
+    """
+    save(trial_figure(trial, title), path)
+
+
+def trial_figure(trial: Analysis, title: str) -> Any:
+    """The picture. Where samples are missing, curves and stances break and footfalls are left out.
+
+    Raises:
+        ValueError: as `draw_trial`.
 
     """
     course = _Course.of(trial)
@@ -46,7 +54,7 @@ def draw_trial(trial: Analysis, title: str, path: Path) -> None:
         _shade_gaps(axes, course)
     figure.suptitle(_in_lines(title))
     figure.align_ylabels()
-    save(figure, path)
+    return figure
 
 
 class _Course(NamedTuple):

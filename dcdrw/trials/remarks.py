@@ -40,7 +40,7 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         yield Remark(f'{refused} of {of} joint states were refused: {reasons}.', True)
     if cadence.lost:
         yield Remark(
-            f'By the stamps, {cadence.lost} of {trial.joint_states + cadence.lost} samples are missing, in '
+            f'By the stamps, {cadence.lost} of {len(trial.motion.stamp_ns) + cadence.lost} samples are missing, in '
             f'{_number_of(cadence.gaps, "gap")} of up to {cadence.longest:.3g} s.'
         )
     if estimator.n_uncertain:

@@ -1,0 +1,76 @@
+"""The picture of a trial shows what was measured, and nothing where nothing was."""
+
+import numpy as np
+import pytest
+
+from dcdrw.suite.parameter_file import TrialParams
+from dcdrw.trials.analysis import analyze
+from dcdrw.trials.figure import draw_trial, trial_figure
+from tests.tracker.walking import walk
+from tests.trials import batch
+
+WALK = walk(12.0).samples()
+GAP = 3.0, 3.6
+
+
+def figure(samples, force=1.0, title=''):
+    return trial_figure(analyze([batch(samples, force)], TrialParams()), title)
+
+
+def without(begin, end):
+    return [sample for sample in WALK if not begin < (sample.stamp_ns - WALK[0].stamp_ns) / 1e9 < end]
+
+
+def test_no_curve_crosses_a_gap():
+    for axes in figure(without(*GAP)).axes[:4]:
+        for line in axes.lines:
+            times = np.asarray(line.get_xdata(), float)
+            if line.get_linestyle() == 'None' or len(times) < 3:
+                continue
+            joined = np.isfinite(times[:-1]) & np.isfinite(times[1:])
+            assert np.abs(np.diff(times))[joined].max() < 0.1
+            assert not ((times > GAP[0] + 1e-9) & (times < GAP[1] - 1e-9)).any()
+
+
+def test_stances_and_footfalls_within_a_gap_are_left_out():
+    gait = figure(without(*GAP)).axes[2]
+    for bars in gait.collections[:-1]:
+        for path in bars.get_paths():
+            begin, end = path.vertices[:, 0].min(), path.vertices[:, 0].max()
+            assert end <= GAP[0] + 1e-6 or begin >= GAP[1] - 1e-6
+    marks = np.concatenate([line.get_xdata() for line in gait.lines])
+    assert len(marks) > 30
+    assert not ((marks > GAP[0]) & (marks < GAP[1])).any()
+
+
+def test_gaps_are_named_and_where_there_are_none_so_is_nothing():
+    for samples, named in ((without(*GAP), True), (WALK, False)):
+        names = [text.get_text() for text in figure(samples).axes[0].get_legend().get_texts()]
+        assert ('no samples' in names) is named
+
+
+def test_a_source_without_force_has_no_empty_panel():
+    assert [axes.get_ylabel() for axes in figure(WALK).axes][-1] == 'coupler force [N]'
+    panels = figure(WALK, force=np.nan).axes
+    assert len(panels) == 3
+    assert all(axes.lines for axes in panels)
+
+
+@pytest.mark.parametrize('samples', [WALK[:600], WALK, without(0.5, 11.0)], ids=['3 s', '12 s', 'mostly gap'])
+def test_no_text_covers_another(samples):
+    long = 'From 21.6 % to within ±6 % of 50 % of a step (25 % of a stride) in 9 steps. ' * 4
+    drawn = figure(samples, title=long)
+    drawn.draw_without_rendering()
+    texts = [drawn._suptitle, *(axes.get_legend() for axes in drawn.axes if axes.get_legend())]
+    boxes = [text.get_window_extent() for text in texts]
+    boxes += [axes.get_window_extent() for axes in drawn.axes]
+    for i, one in enumerate(boxes):
+        assert drawn.bbox.x0 <= one.x0 <= one.x1 <= drawn.bbox.x1
+        assert not any(one.shrunk(0.98, 0.98).overlaps(other.shrunk(0.98, 0.98)) for other in boxes[i + 1 :])
+
+
+def test_it_is_drawn_into_a_file_of_each_kind(tmp_path):
+    trial = analyze([batch(WALK)], TrialParams())
+    for ending, begin in (('png', b'\x89PNG'), ('pdf', b'%PDF'), ('svg', b'<?xml')):
+        draw_trial(trial, 'title', tmp_path / f'trial.{ending}')
+        assert (tmp_path / f'trial.{ending}').read_bytes().startswith(begin)

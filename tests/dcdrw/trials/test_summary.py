@@ -1,0 +1,147 @@
+"""A verdict says what it leaves out, and a trial that was not run has none."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from dcdrw.suite.parameter_file import TrialParams
+from dcdrw.trials.analysis import Analysis, analyze
+from dcdrw.trials.results import write_results
+from dcdrw.trials.summary import summarize
+from dcdrw_msgs_py.diagnosis import PairState
+from dcdrw_msgs_py.samples import SECOND, JointSample, Turn
+from tests.tracker.walking import walk
+from tests.trials import batch
+
+WALK = walk(20.0).samples()
+RATE = 200
+
+
+def trial(samples: list[JointSample]) -> Analysis:
+    return analyze([batch(samples)], TrialParams())
+
+
+def later(samples: list[JointSample], seconds: float) -> list[JointSample]:
+    return [sample._replace(stamp_ns=sample.stamp_ns + round(seconds * SECOND)) for sample in samples]
+
+
+def held(seconds: float) -> list[JointSample]:
+    first = WALK[0]
+    return [
+        JointSample(first.stamp_ns + i * SECOND // RATE, Turn(first.front.angle, 0.0), Turn(first.rear.angle, 0.0))
+        for i in range(round(seconds * RATE))
+    ]
+
+
+def test_a_whole_trial_needs_no_remark():
+    summary = summarize(trial(WALK))
+    assert (summary.state, summary.reason, summary.complete) == (PairState.SYNCHRONIZED, None, True)
+    assert (summary.remarks, summary.judged_from_s) == ((), 0.0)
+    assert summary.sentence.count('. ') == 0
+
+
+def test_wheels_that_were_held_throughout_have_no_verdict(tmp_path):
+    summary = summarize(trial(held(5.0)))
+    assert (summary.state, summary.synchronized, summary.steps_to_synchronization) == (PairState.HELD, None, None)
+    assert not summary.complete
+    assert summary.reason in summary.sentence
+    write_results(trial(held(5.0)), tmp_path)
+    told = json.loads((tmp_path / 'summary.json').read_text())
+    assert (told['state'], told['synchronized'], told['reason']) == ('held', None, summary.reason)
+    assert not (tmp_path / 'trial.png').exists()
+
+
+def test_where_nothing_came_there_are_no_data(tmp_path):
+    empty = analyze([], TrialParams())
+    summary = summarize(empty)
+    assert (summary.state, summary.synchronized, summary.complete) == (PairState.NO_DATA, None, False)
+    write_results(empty, tmp_path)
+    assert json.loads((tmp_path / 'summary.json').read_text())['state'] == 'no_data'
+    assert not (tmp_path / 'trial.png').exists()
+
+
+def test_a_pause_takes_nothing_back():
+    half = len(WALK) // 2
+    rest = [
+        WALK[half]._replace(
+            stamp_ns=WALK[half].stamp_ns + (i + 1) * SECOND // RATE,
+            front=Turn(WALK[half].front.angle, 0.0),
+            rear=Turn(WALK[half].rear.angle, 0.0),
+        )
+        for i in range(5 * RATE)
+    ]
+    summary = summarize(trial([*WALK[: half + 1], *rest]))
+    assert summary.state is PairState.SYNCHRONIZED
+    assert summary.complete
+
+
+def test_stamps_that_stand_still_are_refused_and_counted():
+    stuck = [sample._replace(stamp_ns=WALK[0].stamp_ns) if i < 100 else sample for i, sample in enumerate(WALK)]
+    summary = summarize(trial(stuck))
+    assert summary.samples.refused == {'repeated': 99}
+    assert not summary.complete
+    assert '99 of 4000 joint states were refused: the stamp stands still.' in summary.sentence
+
+
+def test_lost_samples_are_said_though_the_verdict_rests_on_all_that_there_is():
+    kept = [sample for i, sample in enumerate(WALK) if not 1000 <= i < 1040]
+    summary = summarize(trial(kept))
+    assert (summary.samples.lost, summary.samples.gaps) == (40, 1)
+    assert summary.samples.longest_gap_s == pytest.approx(0.205)
+    assert summary.complete
+    assert '40 of 4000 samples are missing, in 1 gap of up to 0.205 s' in summary.sentence
+    assert summary.steps_to_synchronization == summarize(trial(WALK)).steps_to_synchronization
+
+
+def test_a_source_that_starts_anew_is_said_with_when_and_by_how_much():
+    half = len(WALK) // 2
+    shift = WALK[half - 1].stamp_ns - WALK[0].stamp_ns + 2 * SECOND
+    summary = summarize(trial([*WALK[:half], *later(WALK, shift / SECOND)]))
+    (restart,) = summary.samples.restarts
+    assert restart.cause == 'rotation'
+    assert restart.front == pytest.approx(WALK[0].front.angle - WALK[half - 1].front.angle)
+    assert summary.judged_from_s == pytest.approx(shift / SECOND)
+    assert not summary.complete
+    assert 'The source began anew after 10.0 s' in summary.sentence
+    assert 'what came before is left out' in summary.sentence
+    alone = summarize(trial(WALK))
+    assert summary.steps_to_synchronization == alone.steps_to_synchronization
+    assert summary.final_band_percent == alone.final_band_percent
+
+
+def test_a_long_silence_begins_the_judgement_anew_and_is_said():
+    kept = [sample for i, sample in enumerate(WALK) if not 1000 <= i < 1500]
+    summary = summarize(trial(kept))
+    assert not summary.complete
+    assert 'No sample of use came for 2.5 s after 5.0 s' in summary.sentence
+    assert 'n may be off' in summary.sentence
+
+
+def test_a_clock_that_was_set_is_said_and_costs_nothing():
+    half = len(WALK) // 2
+    summary = summarize(trial([*WALK[:half], *later(WALK[half:], 37.0)]))
+    assert summary.complete
+    assert 'The clock of the source was set by +37 s' in summary.sentence
+    assert summary.steps_to_synchronization == summarize(trial(WALK)).steps_to_synchronization
+    assert summary.duration_s == pytest.approx(20.0, abs=0.1)
+
+
+def test_wheels_that_roll_uphill_bring_a_hint_at_the_sign():
+    mirrored = [sample._replace(front=Turn(-sample.front.angle, -sample.front.rate)) for sample in WALK]
+    summary = summarize(trial(mirrored))
+    assert summary.samples.hints == ('front_sign',)
+    assert not summary.complete
+    assert 'front_sign' in summary.sentence
+
+
+def test_every_count_is_json(tmp_path):
+    half = len(WALK) // 2
+    odd = [*WALK[:half], WALK[half]._replace(front=Turn(math.nan, 0.0)), *later(WALK, 30.0)]
+    write_results(trial(odd), tmp_path)
+    told = json.loads((tmp_path / 'summary.json').read_text(), parse_constant=pytest.fail)
+    assert told['samples']['refused'] == {'not finite': 1}
+    assert told['samples']['restarts'][0]['cause'] == 'rotation'
+    assert [remark['rests_on_less'] for remark in told['remarks'][:2]] == [True, True]
+    assert np.isfinite(told['duration_s'])
