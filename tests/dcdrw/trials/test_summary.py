@@ -47,7 +47,7 @@ def test_wheels_that_were_held_throughout_have_no_verdict(tmp_path):
     assert (summary.state, summary.synchronized, summary.steps_to_synchronization) == (PairState.HELD, None, None)
     assert not summary.complete
     assert summary.reason in summary.sentence
-    write_results(trial(held(5.0)), tmp_path)
+    write_results(trial(held(5.0)), tmp_path, {})
     told = json.loads((tmp_path / 'summary.json').read_text())
     assert (told['state'], told['synchronized'], told['reason']) == ('held', None, summary.reason)
     assert not (tmp_path / 'trial.png').exists()
@@ -57,7 +57,7 @@ def test_where_nothing_came_there_are_no_data(tmp_path):
     empty = analyze([], TrialParams())
     summary = summarize(empty)
     assert (summary.state, summary.synchronized, summary.complete) == (PairState.NO_DATA, None, False)
-    write_results(empty, tmp_path)
+    write_results(empty, tmp_path, {})
     assert json.loads((tmp_path / 'summary.json').read_text())['state'] == 'no_data'
     assert not (tmp_path / 'trial.png').exists()
 
@@ -139,7 +139,7 @@ def test_wheels_that_roll_uphill_bring_a_hint_at_the_sign():
 def test_every_count_is_json(tmp_path):
     half = len(WALK) // 2
     odd = [*WALK[:half], WALK[half]._replace(front=Turn(math.nan, 0.0)), *later(WALK, 30.0)]
-    write_results(trial(odd), tmp_path)
+    write_results(trial(odd), tmp_path, {})
     told = json.loads((tmp_path / 'summary.json').read_text(), parse_constant=pytest.fail)
     assert told['samples']['refused'] == {'not finite': 1}
     assert told['samples']['restarts'][0]['cause'] == 'rotation'
