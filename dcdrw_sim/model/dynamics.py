@@ -13,6 +13,8 @@ from dcdrw_msgs_py.rolling import stance_distance as _stance_distance
 from dcdrw_msgs_py.values import Real, functions_of
 from dcdrw_sim.model.wheel import inertia, kinetic_energy, pull
 
+NO_TORQUES = (0.0, 0.0)
+
 
 class State(NamedTuple):
     """Stance angles [rad] and speeds [rad/s] of the front (1) and rear (2) wheel."""
@@ -58,14 +60,21 @@ def coupler_force(rig: RigParams, length: Real, rate: Real) -> Real:
     return rig.k * (length - rig.D0) + rig.b * rate
 
 
-def accelerations(rig: RigParams, state: State, S: Real, external_force: Real = 0.0) -> tuple[Real, Real]:
-    """θ̈1 and θ̈2 [rad/s²] (1), (2), for unequal wheels; `external_force` [N] adds to the coupler's."""
+def accelerations(
+    rig: RigParams, state: State, S: Real, external_force: Real = 0.0, torques: tuple[float, float] = NO_TORQUES
+) -> tuple[Real, Real]:
+    """θ̈1 and θ̈2 [rad/s²] (1), (2), for unequal wheels.
+
+    `external_force` [N] adds to the coupler's; the torques [N·m] act on the hubs, positive downhill.
+    """
     spring = coupler(rig, state, S)
     force = (coupler_force(rig, spring.length, spring.rate) + external_force) / spring.length
     front, rear, sin = rig.front, rig.rear, functions_of(state.theta1).sin
     return (
-        pull(front, rig.gravity) * sin(state.theta1 + rig.slope) - spring.p1 * force * front.length / inertia(front),
-        pull(rear, rig.gravity) * sin(state.theta2 + rig.slope) + spring.p2 * force * rear.length / inertia(rear),
+        pull(front, rig.gravity) * sin(state.theta1 + rig.slope)
+        + (torques[0] - spring.p1 * force * front.length) / inertia(front),
+        pull(rear, rig.gravity) * sin(state.theta2 + rig.slope)
+        + (torques[1] + spring.p2 * force * rear.length) / inertia(rear),
     )
 
 
@@ -82,7 +91,14 @@ def reset(alpha: float, kept: float, omega: float, direction: int) -> tuple[floa
     return -direction * alpha, omega * kept
 
 
-def tipping(rig: RigParams, i: int, state: State, steps: Sequence[int], external_force: float = 0.0) -> float:
+def tipping(
+    rig: RigParams,
+    i: int,
+    state: State,
+    steps: Sequence[int],
+    external_force: float = 0.0,
+    torques: tuple[float, float] = NO_TORQUES,
+) -> float:
     """Acceleration at which a wheel at rest on two spokes is pushed over one of them [rad/s²].
 
     Positive over its forward spoke, negative over the one behind, 0 where weight and coupler press it on both.
@@ -94,14 +110,15 @@ def tipping(rig: RigParams, i: int, state: State, steps: Sequence[int], external
         state: the state, with this wheel's angle told from its forward spoke: −α.
         steps: n1, n2.
         external_force: added to the coupler's [N].
+        torques: on the hubs, positive downhill [N·m].
 
     """
     behind = list(state)
     behind[2 * i] = -state[2 * i]
     S = stance_distance(rig, *steps)
     S_behind = stance_distance(rig, steps[0] - (i == 0), steps[1] - (i == 1))
-    forward = float(accelerations(rig, state, S, external_force)[i])
-    backward = -float(accelerations(rig, State(*behind), S_behind, external_force)[i])
+    forward = float(accelerations(rig, state, S, external_force, torques)[i])
+    backward = -float(accelerations(rig, State(*behind), S_behind, external_force, torques)[i])
     if max(forward, backward) <= 0.0:
         return 0.0
     return forward if forward >= backward else -backward

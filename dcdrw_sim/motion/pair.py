@@ -9,10 +9,19 @@ from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
 from dcdrw_msgs_py.quantity import check
-from dcdrw_msgs_py.rig import RigParams, WheelParams
+from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelParams
 from dcdrw_msgs_py.rolling import rotation
 from dcdrw_msgs_py.values import Real
-from dcdrw_sim.model.dynamics import State, coupler, coupler_force, hub_distance, reset, stance_distance, tipping
+from dcdrw_sim.model.dynamics import (
+    NO_TORQUES,
+    State,
+    coupler,
+    coupler_force,
+    hub_distance,
+    reset,
+    stance_distance,
+    tipping,
+)
 from dcdrw_sim.model.wheel import kept
 from dcdrw_sim.motion import taylor
 from dcdrw_sim.motion.ends import (
@@ -98,8 +107,8 @@ class _Ahead(NamedTuple):
 class Simulation:
     """A pair of wheels in time: `step` from series to series, or `advance_to` times of one's own choice.
 
-    Both give the same motion, and may be mixed. The rig and the external force may change at any time; the
-    change holds from the present time on.
+    Both give the same motion, and may be mixed. The rig, the external force and the torques may change at any
+    time; the change holds from the present time on.
 
     Args:
         rig: the rig; derived defaults are filled in.
@@ -130,7 +139,7 @@ class Simulation:
         """Whether the front and the rear wheel stand still on two spokes."""
         self.last_strike = [0.0, 0.0]
         """When each wheel struck or was let go last [s]."""
-        self._force = 0.0
+        self._force, self._torques = 0.0, NO_TORQUES
         self._series_start = 0.0
         self._ahead: _Ahead | None = None
         self._untold: list[Strike] = []
@@ -169,6 +178,21 @@ class Simulation:
         if force != self._force:
             self._start_anew()
             self._force = float(force)
+            self._write_parameters()
+
+    @property
+    def torques(self) -> tuple[float, float]:
+        """Torques on the front and the rear hub, positive where they roll it downhill [N·m]; held until changed."""
+        return self._torques
+
+    @torques.setter
+    def torques(self, torques: tuple[float, float]) -> None:
+        for name, torque in zip((FRONT, REAR), torques, strict=True):
+            if not math.isfinite(torque):
+                raise ValueError(f'the torque on the {name} hub must be finite, got {torque} N·m')
+        if torques != self._torques:
+            self._start_anew()
+            self._torques = float(torques[0]), float(torques[1])
             self._write_parameters()
 
     @property
@@ -336,7 +360,7 @@ class Simulation:
         self._write_parameters()
 
     def _tipping(self, i: int, t: float) -> float:
-        return tipping(self._rig, i, self._evaluate(t), self.steps, self._force)
+        return tipping(self._rig, i, self._evaluate(t), self.steps, self._force, self._torques)
 
     def _release_time(self, i: int, h: float) -> float:
         """When within a step a standing wheel begins to tip, by bisection; h where it does not."""
@@ -364,7 +388,7 @@ class Simulation:
         w[taylor.THETA1], w[taylor.OMEGA1], w[taylor.THETA2], w[taylor.OMEGA2] = map(float, state)
 
     def _write_parameters(self) -> None:
-        for row, value in taylor.work_parameters(self._rig, self._force).items():
+        for row, value in taylor.work_parameters(self._rig, self._force, self._torques).items():
             self._work[row] = float(value)
         self._work[taylor.S] = float(stance_distance(self._rig, *self.steps))
         for i in (0, 1):

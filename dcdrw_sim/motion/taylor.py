@@ -11,8 +11,8 @@ with the difference δ = θ1 − θ2 as a third angle, the length of the coupler
 
     D²  = ℓ1² + ℓ2² + S² + 2 S (ℓ1 sin θ1 − ℓ2 sin θ2) − 2 ℓ1 ℓ2 cos δ
     F   = k (D − D0) + b Ḋ + F_ext
-    ω1' = g/ℓ1 sin(θ1 + γ) − (ℓ2 sin δ + S cos θ1) (F/D)/(m1 ℓ1)
-    ω2' = g/ℓ2 sin(θ2 + γ) + (ℓ1 sin δ + S cos θ2) (F/D)/(m2 ℓ2)
+    ω1' = g/ℓ1 sin(θ1 + γ) − (ℓ2 sin δ + S cos θ1) (F/D)/(m1 ℓ1) + T1/(m1 ℓ1²)
+    ω2' = g/ℓ2 sin(θ2 + γ) + (ℓ1 sin δ + S cos θ2) (F/D)/(m2 ℓ2) + T2/(m2 ℓ2²)
 
 Products of series are convolutions (Jorba and Zou, Exp. Math. 14, 2005). Sine and cosine follow from
 sin' = ω cos and cos' = −ω sin; D and F/D from D·D and D·(F/D), solved for the newest coefficient.
@@ -27,6 +27,7 @@ import numpy as np
 
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.values import Floats, Real, each
+from dcdrw_sim.model.dynamics import NO_TORQUES
 from dcdrw_sim.model.rigs import Rigs
 from dcdrw_sim.model.wheel import inertia, kept, pull
 
@@ -69,8 +70,10 @@ _SERIES = (ORDER + 1) * LANES
     ALPHA2,
     KEPT1,
     KEPT2,
+    DRIVE1,
+    DRIVE2,
     END,
-) = range(15 * _SERIES, 15 * _SERIES + 26 * LANES, LANES)
+) = range(15 * _SERIES, 15 * _SERIES + 28 * LANES, LANES)
 FIRST_PARAMETER, PARAMETERS = G1, (END - G1) // LANES
 """Where the parameters begin, and how many there are."""
 
@@ -92,8 +95,17 @@ _SIN = tuple(1.0 / ((2 * j) * (2 * j + 1)) for j in range(9, 0, -1))
 _COS = tuple(1.0 / ((2 * j - 1) * (2 * j)) for j in range(9, 0, -1))
 
 
-def work_parameters(rig: RigParams | Rigs, external_force: float = 0.0) -> dict[int, Real]:
-    """What the rows of the work array that hold parameters are, for one rig or for N, but S."""
+def work_parameters(
+    rig: RigParams | Rigs, external_force: float = 0.0, torques: tuple[float, float] = NO_TORQUES
+) -> dict[int, Real]:
+    """What the rows of the work array that hold parameters are, for one rig or for N, but S.
+
+    Args:
+        rig: one or N.
+        external_force: added to the coupler's [N].
+        torques: on the hubs, positive downhill [N·m].
+
+    """
     front, rear = rig.front, rig.rear
     return {
         G1: pull(front, rig.gravity),
@@ -112,6 +124,8 @@ def work_parameters(rig: RigParams | Rigs, external_force: float = 0.0) -> dict[
         ALPHA2: rear.alpha,
         KEPT1: kept(front),
         KEPT2: kept(rear),
+        DRIVE1: torques[0] / inertia(front),
+        DRIVE2: torques[1] / inertia(rear),
         FREE1: 1.0,
         FREE2: 1.0,
     }
@@ -210,8 +224,10 @@ def expand(work: Table, lanes: int) -> None:
         convolve(w, _TORQUES, order)
         weight1 = w[SIN1 + n] * w[COS_SLOPE] + w[COS1 + n] * w[SIN_SLOPE]
         weight2 = w[SIN2 + n] * w[COS_SLOPE] + w[COS2 + n] * w[SIN_SLOPE]
-        omega1 = (w[G1] * weight1 - w[SUM1] * w[INV_ML1]) * (w[FREE1] * scale)
-        omega2 = (w[G2] * weight2 + w[SUM2] * w[INV_ML2]) * (w[FREE2] * scale)
+        omega1, omega2 = w[G1] * weight1 - w[SUM1] * w[INV_ML1], w[G2] * weight2 + w[SUM2] * w[INV_ML2]
+        if order == 0:
+            omega1, omega2 = omega1 + w[DRIVE1], omega2 + w[DRIVE2]
+        omega1, omega2 = omega1 * (w[FREE1] * scale), omega2 * (w[FREE2] * scale)
         w[THETA1 + following], w[THETA2 + following] = w[OMEGA1 + n] * scale, w[OMEGA2 + n] * scale
         w[OMEGA1 + following], w[OMEGA2 + following], w[OMEGA + following] = omega1, omega2, omega1 - omega2
 

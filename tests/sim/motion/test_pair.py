@@ -286,6 +286,40 @@ def test_a_force_that_is_none_is_refused(force):
     assert simulation.external_force == 0.0
 
 
+@pytest.mark.parametrize('torques', [(math.nan, 0.0), (0.0, math.inf)])
+def test_torques_that_are_none_are_refused(torques):
+    simulation = Simulation(*START)
+    with pytest.raises(ValueError, match=r'the torque on the (front|rear) hub must be finite'):
+        simulation.torques = torques
+    assert simulation.torques == (0.0, 0.0)
+
+
+def test_a_torque_on_a_hub_works_by_the_angle_that_it_turns_through():
+    simulation = Simulation(*start(UNCOUPLED, 0.9))
+    rig, before, work = simulation.rig, mechanical_energy(simulation.rig, simulation.state, 0, 0), 0.0
+    simulation.torques = 3.0, -2.0
+    for _ in range(20):  # each is changed on the way, and holds from then on
+        at = simulation.state
+        simulation.advance_to(simulation.time + 0.01)
+        force = simulation.torques
+        work += force[0] * (simulation.state.theta1 - at.theta1) + force[1] * (simulation.state.theta2 - at.theta2)
+        simulation.torques = force[1], force[0]
+    assert simulation.steps == [0, 0]
+    assert mechanical_energy(rig, simulation.state, 0, 0) - before == pytest.approx(work, abs=1e-10)
+
+
+def test_a_torque_pushes_a_standing_wheel_over_its_spoke():
+    rig = UNCOUPLED._replace(slope=0.0)
+    simulation = Simulation(rig, State(-rig.front.alpha, 0.0, -rig.rear.alpha, 0.0))
+    weight = rig.rear.mass * rig.gravity * rig.rear.length * math.sin(rig.rear.alpha)
+    simulation.torques = weight, weight
+    assert simulation.standing == [True, True]
+    simulation.torques = weight, 1.1 * weight
+    simulation.advance_to(5.0)
+    assert simulation.standing == [True, False]
+    assert simulation.steps[1] > 0
+
+
 def test_a_refused_rig_leaves_the_old_one():
     simulation = Simulation(*START)
     with pytest.raises(ValueError, match='k must be ≥ 0'):

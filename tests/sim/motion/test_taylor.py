@@ -3,9 +3,10 @@ import math
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from dcdrw_sim.model.dynamics import State, accelerations, coupler, coupler_force
+from dcdrw_sim.model.dynamics import NO_TORQUES, State, accelerations, coupler, coupler_force
 from dcdrw_sim.motion import taylor
 from dcdrw_sim.motion.taylor import LANES, LENGTH, OMEGA1, OMEGA2, ORDER, PULL, THETA1, THETA2, S, work_parameters
 from tests.sim.oracle import paper_rates
@@ -14,11 +15,11 @@ from tests.sim.rigs import UNEQUAL, between, rigs, rolling, starts
 few = settings(max_examples=30, deadline=None)
 
 
-def expanded(rig, state, external_force=0.0):
+def expanded(rig, state, external_force=0.0, torques=NO_TORQUES):
     """The work array of one pair."""
     rig = rig.resolved()
     w = [0.0] * taylor.END
-    for row, value in work_parameters(rig, external_force).items():
+    for row, value in work_parameters(rig, external_force, torques).items():
         w[row] = value
     w[S], (w[THETA1], w[OMEGA1], w[THETA2], w[OMEGA2]) = rig.S0, state
     taylor.expand(w, 1)
@@ -30,11 +31,11 @@ def coefficients(w, series):
 
 
 @few
-@given(rigs, starts, between(-20.0, 20.0))
-def test_the_first_coefficients_are_speed_and_acceleration(rig, start, force):
+@given(rigs, starts, between(-20.0, 20.0), st.tuples(between(-20.0, 20.0), between(-20.0, 20.0)))
+def test_the_first_coefficients_are_speed_and_acceleration(rig, start, force, torques):
     rig, state = rig.resolved(), rolling(rig, *start)
-    w = expanded(rig, state, force)
-    expected = accelerations(rig, state, rig.S0, force)
+    w = expanded(rig, state, force, torques)
+    expected = accelerations(rig, state, rig.S0, force, torques)
     assert [w[THETA1 + LANES], w[THETA2 + LANES]] == [state.omega1, state.omega2]
     assert [w[OMEGA1 + LANES], w[OMEGA2 + LANES]] == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
