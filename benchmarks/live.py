@@ -49,7 +49,7 @@ class BareNode(Node):
 
     def __init__(self) -> None:
         super().__init__('bare')
-        for topic in (JOINT_STATES, PHASE_STATE, FOOTFALLS, SYNCHRONIZED, DIAGNOSTICS):
+        for topic in (JOINT_STATES, PHASE_STATE, *FOOTFALLS.values(), SYNCHRONIZED, DIAGNOSTICS):
             listen(self, topic, lambda message: None)
 
 

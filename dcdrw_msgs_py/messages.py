@@ -26,10 +26,14 @@ from dcdrw_msgs_py.samples import (
 from dcdrw_msgs_py.topics import (
     COUPLER,
     FRONT_STANCE,
+    FRONT_STEPS,
     FRONT_WHEEL,
     PHI_JOINT,
     REAR_STANCE,
+    REAR_STEPS,
     REAR_WHEEL,
+    RESTARTS,
+    SLOPE_FRAME,
     STEP_DIFFERENCE_JOINT,
 )
 
@@ -142,7 +146,9 @@ class PhaseSampleReader:
     """Reads `phase_state`."""
 
     def __init__(self) -> None:
-        self._joints = Joints((FRONT_STANCE, REAR_STANCE, PHI_JOINT, STEP_DIFFERENCE_JOINT))
+        self._joints = Joints(
+            (FRONT_STANCE, REAR_STANCE, PHI_JOINT, STEP_DIFFERENCE_JOINT), (FRONT_STEPS, REAR_STEPS, RESTARTS)
+        )
 
     def read(self, message: Any) -> PhaseSample:
         """The sample in a message.
@@ -151,7 +157,8 @@ class PhaseSampleReader:
             ValueError: as `Joints.read`, or a step difference that is no number.
 
         """
-        front, rear, phi, (difference, _, _) = self._joints.read(message)
+        front, rear, phi, (difference, *_), *counts = self._joints.read(message)
+        steps1, steps2, restarts = (round(count) if math.isfinite(count) else 0 for count, *_ in counts)
         if not math.isfinite(difference):
             raise ValueError(f'{STEP_DIFFERENCE_JOINT} must be a number, got {difference}')
         return PhaseSample(
@@ -160,7 +167,9 @@ class PhaseSampleReader:
             Turn(*rear[:2]),
             Turn(*phi[:2]),
             round(difference),
-            run_of(message.header.frame_id),
+            restarts,
+            steps1,
+            steps2,
         )
 
 
@@ -194,30 +203,38 @@ class PhaseSampleWriter:
     """Writes `phase_state` into one message, which is used again and again."""
 
     def __init__(self) -> None:
-        self._message = JointState(name=[FRONT_STANCE, REAR_STANCE, PHI_JOINT, STEP_DIFFERENCE_JOINT])
+        self._message = JointState(
+            name=[FRONT_STANCE, REAR_STANCE, PHI_JOINT, STEP_DIFFERENCE_JOINT, FRONT_STEPS, REAR_STEPS, RESTARTS]
+        )
 
     def write(self, sample: PhaseSample) -> Any:
         """The message of a sample; valid until the next call."""
-        message, (_, front, rear, phi, difference, restarts) = self._message, sample
+        message, (_, front, rear, phi, difference, restarts, steps1, steps2) = self._message, sample
         message.header.stamp = to_stamp(sample.stamp_ns)
-        message.header.frame_id = f'{RUN}{restarts}'
-        message.position = array('d', (front.angle, rear.angle, phi.angle, difference))
-        message.velocity = array('d', (front.rate, rear.rate, phi.rate, 0.0))
+        message.position = array('d', (front.angle, rear.angle, phi.angle, difference, steps1, steps2, restarts))
+        message.velocity = array('d', (front.rate, rear.rate, phi.rate, 0.0, 0.0, 0.0, 0.0))
         return message
 
 
 def footfall_message(footfall: Footfall) -> Any:
-    """One strike as `footfalls` carries it."""
+    """One strike as `front_footfalls` and `rear_footfalls` carry it; both wheels roll in the plane y = 0."""
     message = PointStamped()
     message.header.stamp = to_stamp(footfall.stamp_ns)
-    message.header.frame_id = footfall.wheel
-    message.point.x, message.point.z = footfall.x, float(footfall.steps)
+    message.header.frame_id = SLOPE_FRAME
+    message.point.x = footfall.x
     return message
 
 
-def footfall(message: Any) -> Footfall:
-    """The strike in a `footfalls` message."""
-    return Footfall(message.header.frame_id, stamp_ns(message.header.stamp), message.point.x, round(message.point.z))
+def footfall(message: Any, wheel: str) -> Footfall:
+    """The strike in a message of a wheel's footfalls.
+
+    Raises:
+        ValueError: its place is no number.
+
+    """
+    if not math.isfinite(message.point.x):
+        raise ValueError(f'the place of a footfall must be finite, got {message.point.x}')
+    return Footfall(wheel, stamp_ns(message.header.stamp), message.point.x)
 
 
 def diagnostics_message(node: str, diagnosis: Diagnosis, now_ns: int) -> Any:

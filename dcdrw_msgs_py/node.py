@@ -17,6 +17,7 @@ from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 import rclpy
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
@@ -36,6 +37,8 @@ SPIN_SECONDS = 0.1
 """How long a spin waits at most before it looks whether a signal came."""
 END_SECONDS = 5.0
 """A node that has not ended so long after a signal is ended by force: DDS was seen to hang for minutes [s]."""
+LEASE_SECONDS = 1.0
+"""The liveliness that a latched topic offers: who asks for as much is told when its publisher is gone [s]."""
 TWIN_SECONDS = 0.2
 """A terminal and `ros2 launch` both pass on one Ctrl-C: a second signal this soon is the same one [s]."""
 OLD, FRESH = 0.25, 0.05
@@ -141,6 +144,8 @@ def advertise(node: Node, topic: Topic) -> Any:
     """Publish a topic: reliably, and latched where it is declared so."""
     durability = DurabilityPolicy.TRANSIENT_LOCAL if topic.latched else DurabilityPolicy.VOLATILE
     qos = QoSProfile(depth=topic.depth, reliability=ReliabilityPolicy.RELIABLE, durability=durability)
+    if topic.latched:  # what is kept outlives whoever said it: let consumers ask whether that node still lives
+        qos.liveliness_lease_duration = Duration(seconds=LEASE_SECONDS)
     return node.create_publisher(message_type(topic), topic.name, qos)
 
 

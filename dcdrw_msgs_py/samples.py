@@ -82,7 +82,11 @@ class PhaseSample(NamedTuple):
     step_difference: int
     """n = n1 − n2."""
     restarts: int = 0
-    """How often the source has started anew; the count n starts afresh with it."""
+    """How often the source has started anew; the counts of steps start afresh with it."""
+    front_steps: int = 0
+    """n1."""
+    rear_steps: int = 0
+    """n2."""
 
 
 class Footfall(NamedTuple):
@@ -94,8 +98,8 @@ class Footfall(NamedTuple):
     """The strike's own time, interpolated between samples."""
     x: float
     """The new stance foot's place down the slope [m]."""
-    steps: int
-    """n_i after the strike."""
+    steps: int = -1
+    """n_i after the strike; -1 where it is not told."""
 
 
 class SyncSample(NamedTuple):

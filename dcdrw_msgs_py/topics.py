@@ -39,11 +39,20 @@ COUPLER_WRENCH = Topic(
 SYNCHRONIZER_STATE = Topic(
     'synchronizer_state', 'std_msgs/msg/String', 'disabled, armed, active, ramp_down or fault', 1, latched=True
 )
-PHASE_STATE = Topic('phase_state', 'sensor_msgs/msg/JointState', 'stance angles, φ and step difference', SAMPLE_DEPTH)
+PHASE_STATE = Topic('phase_state', 'sensor_msgs/msg/JointState', 'stance angles, φ and steps', SAMPLE_DEPTH)
 PHI = Topic('phi', 'std_msgs/msg/Float64', 'φ, rad', SAMPLE_DEPTH)
 STEP_DIFFERENCE = Topic('step_difference', 'std_msgs/msg/Int32', 'n = n1 − n2', SAMPLE_DEPTH)
-FOOTFALLS = Topic(
-    'footfalls', 'geometry_msgs/msg/PointStamped', 'one per strike: wheel, time, place x, step number z', SAMPLE_DEPTH
+FOOTFALLS = {
+    wheel: Topic(
+        f'{wheel}_footfalls',
+        'geometry_msgs/msg/PointStamped',
+        f"one per strike of the {wheel} wheel, at the strike's own time: the new stance foot in the frame slope",
+        SAMPLE_DEPTH,
+    )
+    for wheel in (FRONT, REAR)
+}
+SYNC_STATE = Topic(
+    'sync_state', 'sensor_msgs/msg/JointState', 'stamped: phase (steps) and sync_error (rad), with rates', SAMPLE_DEPTH
 )
 SYNC_ERROR = Topic('sync_error', 'std_msgs/msg/Float64', 'e, rad', SAMPLE_DEPTH)
 SYNC_ERROR_PERCENT = Topic('sync_error_percent', 'std_msgs/msg/Float64', 'e, percent of a step', SAMPLE_DEPTH)
@@ -107,3 +116,8 @@ PARAMETER_EVENTS = Topic(
 # Names of the joints in joint_states and phase_state.
 FRONT_WHEEL, REAR_WHEEL, COUPLER = 'front_wheel', 'rear_wheel', 'coupler'
 FRONT_STANCE, REAR_STANCE, PHI_JOINT, STEP_DIFFERENCE_JOINT = 'front_stance', 'rear_stance', 'phi', 'step_difference'
+FRONT_STEPS, REAR_STEPS, RESTARTS = 'front_steps', 'rear_steps', 'restarts'
+# Names of the joints in sync_state.
+PHASE_JOINT, SYNC_ERROR_JOINT = 'phase', 'sync_error'
+SLOPE_FRAME = 'slope'
+"""x down the slope from the rear wheel's first foothold, y to the left, z along the normal: in the URDF, too."""

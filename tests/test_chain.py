@@ -8,9 +8,9 @@ import pytest
 from std_srvs.srv import SetBool
 
 from dcdrw_msgs_py.diagnosis import PairState, SourceState
-from dcdrw_msgs_py.messages import PhaseSampleReader, diagnoses
+from dcdrw_msgs_py.messages import PhaseSampleReader, diagnoses, footfall
 from dcdrw_msgs_py.rig import RigParams
-from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, PHASE_STATE, SYNC_ERROR_PERCENT, SYNCHRONIZED
+from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, PHASE_STATE, SYNC_ERROR_PERCENT, SYNC_STATE, SYNCHRONIZED
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatorParams
 from tests.bench import Bench
@@ -38,11 +38,15 @@ def let_go(bench: Bench) -> None:
 
 
 def test_estimate_is_the_truth_of_the_simulation(bench):
-    phases, falls, errors = bench.hear(PHASE_STATE), bench.hear(FOOTFALLS), bench.hear(SYNC_ERROR_PERCENT)
+    phases, errors, states = bench.hear(PHASE_STATE), bench.hear(SYNC_ERROR_PERCENT), bench.hear(SYNC_STATE)
+    heard = {wheel: bench.hear(topic) for wheel, topic in FOOTFALLS.items()}
     start_chain(bench)
-    bench.wait(lambda: errors and phases and bench.node.count_publishers(FOOTFALLS.name), 'the whole chain')
+    bench.wait(
+        lambda: errors and phases and all(bench.node.count_publishers(topic.name) for topic in FOOTFALLS.values()),
+        'the whole chain',
+    )
     let_go(bench)
-    bench.wait(lambda: len(falls) >= 16, 'sixteen strikes')
+    bench.wait(lambda: sum(map(len, heard.values())) >= 16, 'sixteen strikes')
     settings = SimulatorParams(initial_phase_percent=STIFF['initial_phase_percent'])
     start_rig, start_state = settings.start(RigParams(k=STIFF['k']))
     model = run(start_rig, start_state, strikes=16)
@@ -50,12 +54,14 @@ def test_estimate_is_the_truth_of_the_simulation(bench):
     moving = [sample for sample in map(read.read, phases) if sample.front.rate]
     start = moving[0].stamp_ns
     # The footfalls are the strikes of the model: in order, interpolated between samples 5 ms apart.
-    assert [1 if fall.header.frame_id == 'front' else 2 for fall in falls[:16]] == [s.wheel for s in model.strikes]
-    for fall, strike in zip(falls, model.strikes, strict=False):
-        t = (fall.header.stamp.sec * 10**9 + fall.header.stamp.nanosec - start) / 1e9
-        assert abs(t - strike.t) < 2e-4
-        first_foot = start_rig.S0 if strike.wheel == 1 else 0.0
-        assert abs(fall.point.x - first_foot - fall.point.z * RigParams().front.step_length) < 1e-9
+    for number, wheel in enumerate(('front', 'rear'), 1):
+        strikes = [strike for strike in model.strikes if strike.wheel == number]
+        first_foot = start_rig.S0 if wheel == 'front' else 0.0
+        for steps, (message, strike) in enumerate(zip(heard[wheel], strikes, strict=False), 1):
+            fall = footfall(message, wheel)
+            assert abs((fall.stamp_ns - start) / 1e9 - strike.t) < 2e-4
+            assert abs(fall.x - first_foot - steps * RigParams().front.step_length) < 1e-9
+    turned = {message.header.stamp.sec * 10**9 + message.header.stamp.nanosec: message for message in states}
     for sample in moving[:400]:
         t = (sample.stamp_ns - start) / 1e9
         if t > model.duration:
@@ -63,6 +69,8 @@ def test_estimate_is_the_truth_of_the_simulation(bench):
         truth = model.at([t])
         phase = (truth.rotation1[0] - truth.rotation2[0]) / (2 * RigParams().front.alpha) % 1.0
         assert abs(sample.phi.angle / (2 * RigParams().front.alpha) - phase) < 1e-8
+        if stamped := turned.get(sample.stamp_ns):
+            assert dict(zip(stamped.name, stamped.position, strict=True))['phase'] == pytest.approx(phase, abs=1e-8)
         assert (
             sample.step_difference == truth.steps1[0] - truth.steps2[0]
             or min(abs(t - s.t) for s in model.strikes) < 1e-6

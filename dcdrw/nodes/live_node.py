@@ -18,7 +18,7 @@ from dcdrw.suite.parameter_file import TrialParams
 from dcdrw_msgs_py.messages import JointSampleReader, PhaseSampleReader, diagnoses, footfall
 from dcdrw_msgs_py.node import listen, steady_clock
 from dcdrw_msgs_py.quantity import build, fields
-from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
 from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, JOINT_STATES, PHASE_STATE
 from dcdrw_tracker.gait.phase import PhaseParams
 from dcdrw_tracker.gait.sync import SyncParams
@@ -146,7 +146,8 @@ class LiveNode(Node):
         for topic, take in (
             (JOINT_STATES, self._on_joints),
             (PHASE_STATE, self._on_phase),
-            (FOOTFALLS, lambda message: self._state.take_footfall(footfall(message))),
+            (FOOTFALLS[FRONT], lambda message: self._state.take_footfall(footfall(message, FRONT))),
+            (FOOTFALLS[REAR], lambda message: self._state.take_footfall(footfall(message, REAR))),
             (DIAGNOSTICS, self._on_diagnostics),
         ):
             listen(self, topic, _bearing(take))

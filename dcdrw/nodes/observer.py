@@ -38,7 +38,8 @@ class Observer(Node):
         for topic, callback in (
             (PHASE_STATE, self._on_phase),
             (SYNC_ERROR, self._on_error),
-            (FOOTFALLS, self._on_footfall),
+            (FOOTFALLS[FRONT], lambda message: self._on_footfall(message, FRONT)),
+            (FOOTFALLS[REAR], lambda message: self._on_footfall(message, REAR)),
             (DIAGNOSTICS, self._on_diagnostics),
         ):
             listen(self, topic, self._bearing(topic.name, callback))
@@ -81,9 +82,9 @@ class Observer(Node):
     def _on_error(self, message: Any) -> None:
         """That it comes is all."""
 
-    def _on_footfall(self, message: Any) -> None:
+    def _on_footfall(self, message: Any, wheel: str) -> None:
         if self.moving:
-            self.strikes[footfall(message).wheel] += 1
+            self.strikes[footfall(message, wheel).wheel] += 1
 
     def _on_diagnostics(self, message: Any) -> None:
         self.diagnoses |= diagnoses(message)

@@ -162,11 +162,13 @@ class LiveState:
             self._phi_due_ns = phase.stamp_ns + POINT_NS
 
     def take_footfall(self, fall: Footfall) -> None:
-        """Take a strike; one of a wheel that no rig has is passed over."""
+        """Take a strike; its place tells which step it is. One of no wheel, or nowhere, is passed over."""
         if fall.wheel not in (FRONT, REAR):
             return
-        self._feet[fall.wheel] = fall.x
-        self._falls.append([fall.wheel, self._seconds(fall.stamp_ns), fall.steps])
+        steps = fall.x / getattr(self._params.phase, fall.wheel).step_length
+        if math.isfinite(steps):
+            self._feet[fall.wheel] = fall.x
+            self._falls.append([fall.wheel, self._seconds(fall.stamp_ns), round(steps)])
 
     def take_health(self, name: str, said: Diagnosis, now: float) -> None:
         """Take what a node says of itself on `/diagnostics`."""

@@ -34,6 +34,7 @@ from dcdrw_msgs_py.topics import (
     STEP_DIFFERENCE,
     SYNC_ERROR,
     SYNC_ERROR_PERCENT,
+    SYNC_STATE,
     SYNCHRONIZED,
     SYNCHRONIZER_STATE,
     TAG_DETECTIONS,
@@ -82,14 +83,14 @@ PHASE_ESTIMATOR = Executable(
     'from wheel rotations to phase, steps and footfalls',
     (PhaseParams,),
     (JOINT_STATES,),
-    (PHASE_STATE, PHI, STEP_DIFFERENCE, FOOTFALLS, DIAGNOSTICS),
+    (PHASE_STATE, PHI, STEP_DIFFERENCE, *FOOTFALLS.values(), DIAGNOSTICS),
 )
 SYNC_MONITOR = Executable(
     'sync_monitor',
     'how far from walking in step, and whether it stays there',
     (SyncParams,),
     (PHASE_STATE,),
-    (SYNC_ERROR, SYNC_ERROR_PERCENT, SYNCHRONIZED, DIAGNOSTICS),
+    (SYNC_STATE, SYNC_ERROR, SYNC_ERROR_PERCENT, SYNCHRONIZED, DIAGNOSTICS),
 )
 
 MARKERS = Executable(

@@ -20,6 +20,7 @@ from dcdrw.trials.analysis import Analysis, analyze
 from dcdrw.trials.filmed_rig import FilmedRig, TruthError, truth_error
 from dcdrw.trials.results import read_trial
 from dcdrw_msgs_py.diagnosis import Diagnosis, RecorderState, messages_of, parameters_of
+from dcdrw_msgs_py.rig import REAR
 from dcdrw_msgs_py.topics import FOOTFALLS, JOINT_STATES, PHASE_STATE, SYNC_ERROR
 
 if TYPE_CHECKING:
@@ -149,7 +150,7 @@ class SimulatedTrial:
             return False
         return (
             all(recorder.number(messages_of(f'/{topic.name}')) > 0 for topic in (JOINT_STATES, *needed))
-            and messages_of(f'/{FOOTFALLS.name}') in recorder.values
+            and messages_of(f'/{FOOTFALLS[REAR].name}') in recorder.values
             and all(recorder.flag(parameters_of(node.name)) for node in self._executables)
         )
 

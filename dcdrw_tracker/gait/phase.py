@@ -359,6 +359,8 @@ class PhaseEstimator:
             Turn(phi, phi_rate),
             front.steps - rear.steps,
             self._restarts,
+            front.steps,
+            rear.steps,
         )
 
     def _hold(self, joints: JointSample, why: Refusal, arrival_ns: int) -> PhaseUpdate | None:

@@ -35,7 +35,7 @@ class PhaseEstimatorNode(Node):
         self._phase = advertise(self, PHASE_STATE)
         self._phi = advertise(self, PHI)
         self._step_difference = advertise(self, STEP_DIFFERENCE)
-        self._footfalls = advertise(self, FOOTFALLS)
+        self._footfalls = {wheel: advertise(self, topic) for wheel, topic in FOOTFALLS.items()}
         self._age = Age()
         report(self, self._diagnose)
         listen(self, JOINT_STATES, self._on_joints)
@@ -72,7 +72,7 @@ class PhaseEstimatorNode(Node):
         self._phi.publish(Float64(data=update.phase.phi.angle))
         self._step_difference.publish(Int32(data=update.phase.step_difference))
         for footfall in update.footfalls:
-            self._footfalls.publish(footfall_message(footfall))
+            self._footfalls[footfall.wheel].publish(footfall_message(footfall))
 
     def _diagnose(self) -> Diagnosis:
         return diagnose_phase(self._estimator.status(), self._age.seconds, STALE_AFTER)

@@ -133,7 +133,7 @@ class SyncMonitor:
 
     def update(self, phase: PhaseSample) -> SyncSample | None:
         """Take the next sample; None where an angle is none, or where the stamp is that of the last sample."""
-        stamp_ns, now_front, now_rear, phi, n, restarts = phase
+        stamp_ns, now_front, now_rear, phi, n, restarts, *_ = phase
         front, rear = now_front.angle, now_rear.angle
         if not (-math.pi <= front <= math.pi and -math.pi <= rear <= math.pi and -math.pi <= phi.angle <= math.pi):
             return None

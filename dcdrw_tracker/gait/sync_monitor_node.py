@@ -7,9 +7,18 @@ from rclpy.node import Node
 from std_msgs.msg import Bool, Float64
 
 from dcdrw_msgs_py.diagnosis import REFUSED, Diagnosis, PairState
-from dcdrw_msgs_py.messages import PhaseSampleReader
+from dcdrw_msgs_py.messages import PhaseSampleReader, turns_message
 from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
-from dcdrw_msgs_py.topics import PHASE_STATE, SYNC_ERROR, SYNC_ERROR_PERCENT, SYNCHRONIZED
+from dcdrw_msgs_py.samples import Turn
+from dcdrw_msgs_py.topics import (
+    PHASE_JOINT,
+    PHASE_STATE,
+    SYNC_ERROR,
+    SYNC_ERROR_JOINT,
+    SYNC_ERROR_PERCENT,
+    SYNC_STATE,
+    SYNCHRONIZED,
+)
 from dcdrw_tracker.gait.diagnostics import diagnose_sync
 from dcdrw_tracker.gait.pair_state import judge
 from dcdrw_tracker.gait.sync import SyncMonitor, SyncParams
@@ -29,6 +38,8 @@ class SyncMonitorNode(Node):
         self._error = advertise(self, SYNC_ERROR)
         self._error_percent = advertise(self, SYNC_ERROR_PERCENT)
         self._synchronized = advertise(self, SYNCHRONIZED)
+        self._sync_state = advertise(self, SYNC_STATE)
+        self._pitch = self._settings.value.front.alpha + self._settings.value.rear.alpha
         self._unreadable = 0
         self._age = Age()
         self._verdict: bool | None = None
@@ -40,7 +51,8 @@ class SyncMonitorNode(Node):
 
     def _on_phase(self, message: Any) -> None:
         try:
-            sync = self._monitor.update(self._reader.read(message))
+            phase = self._reader.read(message)
+            sync = self._monitor.update(phase)
         except ValueError as error:
             sync = None
             self.get_logger().warning(f'phase_state: {error}', throttle_duration_sec=1.0)
@@ -48,6 +60,12 @@ class SyncMonitorNode(Node):
             self._unreadable += 1
             return
         self._age.renew()
+        p_rate = phase.phi.rate / self._pitch
+        turns = {
+            PHASE_JOINT: Turn(0.5 + 0.01 * sync.error_percent, p_rate),
+            SYNC_ERROR_JOINT: Turn(sync.error, phase.phi.rate),
+        }
+        self._sync_state.publish(turns_message(sync.stamp_ns, turns))
         self._error.publish(Float64(data=sync.error))
         self._error_percent.publish(Float64(data=sync.error_percent))
         self._tell(sync.synchronized)

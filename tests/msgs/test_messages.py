@@ -41,14 +41,25 @@ def test_joint_samples_survive(sample):
     assert JointSampleReader().read(JointSampleWriter().write(sample)) == sample
 
 
-@given(st.builds(PhaseSample, stamps, turns, turns, turns, st.integers(-1000, 1000), st.integers(0, 1000)))
+counts = st.integers(-1000, 1000)
+
+
+@given(st.builds(PhaseSample, stamps, turns, turns, turns, counts, st.integers(0, 1000), counts, counts))
 def test_phase_samples_survive(sample):
     assert PhaseSampleReader().read(PhaseSampleWriter().write(sample)) == sample
 
 
-@given(st.builds(Footfall, st.sampled_from(['front', 'rear']), stamps, numbers, st.integers(-(10**6), 10**6)))
+@given(st.builds(Footfall, st.sampled_from(['front', 'rear']), stamps, st.floats(-1e6, 1e6)))
 def test_footfalls_survive(fall):
-    assert footfall(footfall_message(fall)) == fall
+    message = footfall_message(fall)
+    assert footfall(message, fall.wheel) == fall._replace(steps=-1)  # the steps are in phase_state
+    assert message.header.frame_id == 'slope'  # as the URDF has it
+
+
+@pytest.mark.parametrize('x', [math.inf, -math.inf, math.nan])
+def test_a_footfall_nowhere_is_refused(x):
+    with pytest.raises(ValueError, match='footfall must be finite'):
+        footfall(footfall_message(Footfall('front', 0, x)), 'front')
 
 
 @given(st.permutations(['front_wheel', 'rear_wheel', 'coupler', 'hip', 'knee']))
@@ -81,9 +92,11 @@ def test_what_cannot_be_read_is_named(names, positions, message):
         JointSampleReader().read(JointState(name=names, position=positions))
 
 
-def test_phase_message_of_a_stranger_needs_no_frame():
+def test_phase_message_of_a_stranger_needs_no_frame_and_no_counts():
     message = PhaseSampleWriter().write(PhaseSample(1, Turn(0.1, 1.0), Turn(0.2, 1.0), Turn(0.3, 0.0), 1, 7))
     message.header.frame_id = 'map'
+    assert PhaseSampleReader().read(message).restarts == 7
+    del message.name[4:], message.position[4:], message.velocity[4:]
     assert PhaseSampleReader().read(message).restarts == 0
 
 

@@ -60,7 +60,7 @@ def test_live_and_offline_agree_to_the_last_bit(live_trial):
     told = live['diagnostics']['sync_monitor']['values'][STEPS_TO_SYNCHRONIZATION]
     assert int(told) == trial.status.steps_to_synchronization
     with Recording(live_trial) as recording:
-        falls = recording.count('/footfalls')
+        falls = sum(recording.count(f'/{wheel}_footfalls') for wheel in ('front', 'rear'))
     assert falls == len(trial.footfalls)
 
 

@@ -45,7 +45,7 @@ def recorded(path: Path, topic: str):
 
 def test_estimator_says_again_what_it_said_live(bench, live_trial):
     bench.start('phase_estimator', '--params-file', str(live_trial / 'parameters.yaml'), use_sim_time=True)
-    phases, clocks, falls = bench.hear(PHASE_STATE), bench.hear(CLOCK), bench.hear(FOOTFALLS)
+    phases, clocks, falls = bench.hear(PHASE_STATE), bench.hear(CLOCK), bench.hear(FOOTFALLS['front'])
     bench.wait(lambda: bench.node.count_publishers('phase_state'), 'the estimator')
     process = replay(bench, str(live_trial), '--rate', '2')
     assert 'joint states sent' in finish(bench, process)
@@ -67,7 +67,7 @@ def test_estimator_says_again_what_it_said_live(bench, live_trial):
             assert tuple(message.name) == names
     assert sum(stamp_ns(message.header.stamp) in live for message in phases) > 900
     with Recording(live_trial) as recording:
-        assert abs(len(falls) - recording.count('/footfalls')) <= 1
+        assert abs(len(falls) - recording.count('/front_footfalls')) <= 1
     times = [clock.clock.sec * 10**9 + clock.clock.nanosec for clock in clocks]
     assert all(0 < later - earlier <= 30_000_000 for earlier, later in pairwise(times[1:]))
     assert min(live) - 10**9 < times[0] < times[-1] <= max(live) + 10**9

@@ -194,7 +194,15 @@ def test_service_starts_and_stops_recordings(bench, tmp_path):
 
 def test_pictures_and_drawings_are_kept_only_when_asked_for():
     names = {topic.name for topic in RECORDED}
-    assert names >= {'joint_states', 'phase_state', 'footfalls', 'synchronized', '/diagnostics', 'tag_detections'}
+    assert names >= {
+        'joint_states',
+        'phase_state',
+        'front_footfalls',
+        'rear_footfalls',
+        'synchronized',
+        '/diagnostics',
+        'tag_detections',
+    }
     assert not names & {'image_raw', 'image_raw/compressed', 'debug_image', 'rig_markers'}
 
 

@@ -36,7 +36,7 @@ def held(bench: Bench, now: int, names: tuple[str, ...] = ('front_wheel', 'rear_
 
 def drive(bench: Bench, names: tuple[str, ...] = ('front_wheel', 'rear_wheel'), count: int = 200, **settings):
     bench.start_ns = bench.node.get_clock().now().nanoseconds
-    phases, falls = bench.hear(PHASE_STATE), bench.hear(FOOTFALLS)
+    phases, falls = bench.hear(PHASE_STATE), {wheel: bench.hear(topic) for wheel, topic in FOOTFALLS.items()}
     publisher = bench.publisher(JOINT_STATES)
     bench.wake(publisher, lambda now: held(bench, now, names), phases)
     for k in range(1, count + 1):
@@ -57,7 +57,7 @@ def test_phase_and_footfalls_follow_the_wheels(bench):
         assert sample.step_difference in (0, -1)
     assert [message.header.stamp for message in phases[:2]] == [joints(bench, k).header.stamp for k in (1, 2)]
     bench.wait(lambda: len(phis) >= len(phases) and len(differences) >= len(phases), 'phi and step_difference')
-    strikes = [footfall(message) for message in falls]
+    strikes = [footfall(message, wheel) for wheel, messages in falls.items() for message in messages]
     for wheel, first in (('rear', ALPHA), ('front', 2 * ALPHA)):
         times = [(fall.stamp_ns - bench.start_ns) / 1e9 for fall in strikes if fall.wheel == wheel]
         expected = [(first + 2 * ALPHA * i) / SPEED for i in range(len(times))]
