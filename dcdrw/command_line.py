@@ -1,7 +1,6 @@
 """Reads the command line and runs the command that it names."""
 
 import argparse
-import errno
 import os
 import signal
 import sys
@@ -13,7 +12,7 @@ from importlib import import_module
 from typing import Any, NoReturn
 
 from dcdrw.commands import Command
-from dcdrw.console import Interrupted
+from dcdrw.console import Interrupted, in_words
 
 
 class CommandParser(argparse.ArgumentParser):
@@ -50,11 +49,10 @@ class CommandLine:
     """The commands, by their names."""
 
     def __init__(self, commands: Mapping[str, Command], description: str, epilog: str) -> None:
-        self._commands = commands
         self.parser = CommandParser(prog='dcdrw', description=description, epilog=epilog)
         self.parser.add_argument('--version', action='store_true', help='tell the version, and end')
         listed = self.parser.add_subparsers(title='commands', metavar='COMMAND', parser_class=CommandParser)
-        self._parsers = {
+        self.commands = {
             name: listed.add_parser(name, help=command.help, module=command.module)
             for name, command in commands.items()
         }
@@ -62,8 +60,8 @@ class CommandLine:
     def run(self, arguments: Sequence[str]) -> int:
         """Run the command that these arguments name; returns the exit status."""
         chosen = next((argument for argument in arguments if not argument.startswith('-')), None)
-        if chosen and chosen not in self._commands:
-            mend = _suggestion(chosen, self._commands) or '; dcdrw --help lists them'
+        if chosen and chosen not in self.commands:
+            mend = _suggestion(chosen, self.commands) or '; dcdrw --help lists them'
             print(f'dcdrw: there is no command {chosen!r}{mend}', file=sys.stderr)
             return 2
         options, unknown = self.parser.parse_known_args(arguments)
@@ -75,7 +73,7 @@ class CommandLine:
             return 0
         prog: str = options.prog
         if unknown:
-            known = self._parsers[chosen].option_strings
+            known = self.commands[chosen].option_strings
             print(f'{prog}: there is no argument {unknown[0]!r}{_suggestion(unknown[0], known)}', file=sys.stderr)
             return 2
         try:
@@ -89,16 +87,8 @@ class CommandLine:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 128 + signal.SIGPIPE
         except (ValueError, OSError) as error:
-            print(f'{prog}: {_in_words(error)}', file=sys.stderr)
+            print(f'{prog}: {in_words(error)}', file=sys.stderr)
             return 2
-
-
-def _in_words(error: ValueError | OSError) -> str:
-    """An error without the system's numbers."""
-    if not isinstance(error, OSError) or not error.strerror:
-        return str(error)
-    reason = 'there is no such file or folder' if error.errno == errno.ENOENT else error.strerror.lower()
-    return f'{error.filename}: {reason}' if error.filename else reason
 
 
 def _suggestion(word: str, known: Mapping[str, Any] | Sequence[str]) -> str:

@@ -1,6 +1,7 @@
 """What commands share at a terminal: types of arguments, live lines and bars, JSON, and what must be installed."""
 
 import argparse
+import errno
 import math
 import os
 import signal
@@ -124,6 +125,14 @@ def _json_file(text: str) -> Path:
     if text != str(STDOUT) and not text.endswith('.json'):
         raise argparse.ArgumentTypeError(f'must end in .json, got {text}; where another argument follows, --json=-')
     return Path(text)
+
+
+def in_words(error: ValueError | OSError) -> str:
+    """An error without the system's numbers."""
+    if not isinstance(error, OSError) or not error.strerror:
+        return str(error)
+    reason = 'there is no such file or folder' if error.errno == errno.ENOENT else error.strerror.lower()
+    return f'{error.filename}: {reason}' if error.filename else reason
 
 
 def tell(options: argparse.Namespace, lines: Iterable[str], result: Any) -> None:

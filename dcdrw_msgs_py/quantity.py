@@ -76,7 +76,7 @@ class Field(NamedTuple):
             return tuple(one._replace(name=f'{self.name}[{i}]').coerce(item) for i, item in enumerate(value))
         if self.kind in (int, float) and isinstance(value, (int, float)) and not isinstance(value, bool):
             if not self.quantity.allows(_as_float(value)):
-                raise ValueError(f'{self.name} must be {self.requirement}, got {value!r}')
+                raise ValueError(f'{self.name} must be {self.requirement}, got {value!r}{self._question(value)}')
             if self.kind is int and value != int(value):
                 raise ValueError(f'{self.name} must be a whole number, got {value!r}')
             return self._chosen(self.kind(value))
@@ -88,6 +88,13 @@ class Field(NamedTuple):
         if self.quantity.choices and value not in self.quantity.choices:
             raise ValueError(f'{self.name} must be {self.quantity.bounds}, got {value!r}')
         return value
+
+    def _question(self, value: float) -> str:
+        """Whether an impossible angle was meant in degrees."""
+        radians = math.radians(value) if math.isfinite(_as_float(value)) else math.nan
+        if self.quantity.unit != 'rad' or not math.isfinite(radians) or not self.quantity.allows(radians):
+            return ''
+        return f': degrees? {value:g}° is {radians:.6g} rad'
 
     @property
     def requirement(self) -> str:

@@ -4,9 +4,13 @@ import argparse
 import sys
 from pathlib import Path
 
+from dcdrw.console import add_json, check_json, in_words, tell
+from dcdrw.drawings.figure_files import add_formats
 from dcdrw.files import add_force, free_folder
-from dcdrw.trials.results import describe, read_trial, write_results
+from dcdrw.trials.expectation import add_expect, expectation_status
+from dcdrw.trials.results import describe, read_trial, result, write_results
 from dcdrw.trials.summary import summarize
+from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.topics import JOINT_STATES
 
 _EPILOG = """\
@@ -14,7 +18,7 @@ A recording is the folder of one, or that of a trial, or a file of one (.mcap or
 or by ros2 bag record.
 The parameters are those that were recorded, or the defaults, and what --rig changes. Without --out, nothing is
 written. Exit status: 0 each was judged by all that it holds, 1 a verdict rests on less, or nothing was run (the
-sentence says why), or one of several could not be read, 2 wrong input.
+sentence says why), or one of several could not be read, 2 wrong input, 3 one did not end as --expect says.
 """
 
 
@@ -41,6 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='DIR',
         help='write summary, picture, samples and footfalls here, or into a folder for each',
     )
+    add_formats(parser)
+    add_json(parser)
+    add_expect(parser)
     add_force(parser)
 
 
@@ -56,14 +63,18 @@ def run(options: argparse.Namespace) -> int:
             free_folder(folder)
         if folders.count(folder) > 1:
             raise ValueError(f'several recordings are called {folder.name}: analyze them one by one')
+    check_json(options)
     several, status = len(options.recordings) > 1, 0
+    lines: list[str] = []
+    results: list[dict[str, object]] = []
+    states: list[PairState] = []
     for path, folder in zip(options.recordings, folders, strict=True):
         try:
             trial, agreements = read_trial(path, rig=options.rig, topic=options.topic)
         except (ValueError, OSError) as error:
             if not several:
                 raise
-            print(f'dcdrw analyze: {error}', file=sys.stderr)  # the others are worth their verdict
+            print(f'dcdrw analyze: {in_words(error)}', file=sys.stderr)  # the others are worth their verdict
             status = 1
             continue
         for text in (*trial.damage, *trial.notes):
@@ -71,13 +82,19 @@ def run(options: argparse.Namespace) -> int:
         summary = summarize(trial)
         status = status if summary.complete else 1
         prefix = f'{path}: ' if several else ''
-        print(prefix + summary.sentence)
-        for topic, (recorded, equal) in agreements.items():
-            print(f'{prefix}{topic}: {equal} of {recorded} recorded are the same here to the last bit')
+        more = {'recording': str(path), 'agreement': describe(agreements)}
+        results.append(result(trial, more))
+        states.append(trial.state)
+        lines.append(prefix + summary.sentence)
+        lines += (
+            f'{prefix}{topic}: {equal} of {recorded} recorded are the same here to the last bit'
+            for topic, (recorded, equal) in agreements.items()
+        )
         if folder:
-            write_results(trial, folder, {'recording': str(path), 'agreement': describe(agreements)}, options.force)
-            print(f'{prefix}written: {folder}/')
-    return status
+            write_results(trial, folder, more, options.force, options.formats)
+            lines.append(f'{prefix}written: {folder}/')
+    tell(options, lines, results if several else results[0])
+    return status or expectation_status(options.expect, states)
 
 
 def _name(path: Path) -> str:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dcdrw.console import Interrupted
+from dcdrw.console import Interrupted, add_json, check_json, tell
 from dcdrw.files import add_force, refuse_existing, write_whole
 from dcdrw.suite.parameter_file import write_changed
 from dcdrw.trials.filmed import Film, add_film_arguments
@@ -41,6 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = _EPILOG
     add_film_arguments(parser)
     parser.add_argument('--out', type=Path, required=True, metavar='OUT.yaml', help='the rig file')
+    add_json(parser)
     add_force(parser)
     parser.add_argument(
         '--learn-slope',
@@ -52,6 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     refuse_existing([options.out], options.force)
+    check_json(options)
     film = Film(options)
     frames = [tracked for _, tracked in film.track()]
     if film.interrupted:
@@ -64,10 +66,10 @@ def run(options: argparse.Namespace) -> int:
     except ValueError as error:
         raise ValueError(f'{film.path}: {error}') from None
     changes = dict(_changes(film, found, axes, options.learn_slope))
-    _tell(film, found, changes)
+    lines = list(_lines(film, found, changes))
     with write_whole(options.out, options.force) as path:
         write_changed(options.rig, changes, path, f'Calibrated by dcdrw calibrate from {film.path.name}.')
-    print(f'Written: {options.out}')
+    tell(options, [*lines, f'Written: {options.out}'], {'parameters': changes, 'calibration': found})
     return 0
 
 
@@ -118,8 +120,8 @@ class _Line(NamedTuple):
     unit: str
 
 
-def _tell(film: Film, found: Calibration, changes: dict[str, Any]) -> None:
-    """Print what was found beside what was configured."""
+def _lines(film: Film, found: Calibration, changes: dict[str, Any]) -> Iterator[str]:
+    """What was found beside what was configured."""
     tags, view, track, _ = film.params
     lines = []
     if 'slope' in changes:
@@ -157,10 +159,10 @@ def _tell(film: Film, found: Calibration, changes: dict[str, Any]) -> None:
                         unit,
                     )
                 )
-    print(f'{"":24} {"configured":>12} {"found":>12}')
+    yield f'{"":24} {"configured":>12} {"found":>12}'
     for line in lines:
-        print(f'{line.what:24} {line.before:12.3f} {line.now:12.3f} ± {line.spread:.3f} {line.unit}')
-    print(
+        yield f'{line.what:24} {line.before:12.3f} {line.now:12.3f} ± {line.spread:.3f} {line.unit}'
+    yield (
         f'From {found.front.steps} steps of the front wheel and {found.rear.steps} of the rear one; their hubs are '
         f'{1e3 * found.front.misfit:.1f} and {1e3 * found.rear.misfit:.1f} mm off the path of a rolling wheel, '
         'root mean square.'
@@ -168,7 +170,7 @@ def _tell(film: Film, found: Calibration, changes: dict[str, Any]) -> None:
     for name, wheel, shape, _ in wheels:
         ratio = wheel.length.value / shape.length
         if abs(ratio - 1.0) > LENGTH_TOLERANCE:
-            print(
+            yield (
                 f'{name}.length is {100.0 * (ratio - 1.0):+.1f} % off what was configured: measure it, or the tags, '
                 f'whose size should be {1e3 * tags.size / ratio:.1f} mm then'
             )

@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dcdrw.console import Bar, add_json, check_json, count, number, positive, tell, tell_where
+from dcdrw.console import Bar, add_json, check_json, positive, tell, tell_where
 from dcdrw.drawings.design_card import draw_card
 from dcdrw.files import add_force, refuse_existing, to_json, write_text, write_whole
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params
-from dcdrw_msgs_py.quantity import build, flatten
+from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.figures.style import new_figure, save
 from dcdrw_sim.model.scaling import nondimensional
@@ -76,18 +76,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = 'Find the coupler that synchronizes a rig fastest, and the one that forgives most.'
     parser.epilog = _EPILOG
     add_rig_options(parser)
-    rig = parser.add_argument_group("the rig, in place of the preset's or the file's")
-    rig.add_argument('--mass', type=positive, metavar='KG', help='of each wheel')
-    rig.add_argument('--length', type=positive, metavar='M', help='of each wheel, hub to foot')
-    rig.add_argument('--spokes', type=count, metavar='N', help='of each wheel')
-    rig.add_argument('--slope-deg', type=number, metavar='DEG')
     coupler = parser.add_argument_group('the coupler')
     for name, unit in (('k', 'N/m'), ('b', 'N·s/m')):
         coupler.add_argument(f'--{name}-min', type=positive, metavar=unit, help=argparse.SUPPRESS)
         coupler.add_argument(f'--{name}-max', type=positive, metavar=unit, help=f'search no further (and --{name}-min)')
     coupler.add_argument('--available', type=Path, metavar='PARTS.csv', help='choose among these parts')
-    coupler.add_argument('--k', type=positive, metavar='N/m', help='judge this one, too; with --b')
-    coupler.add_argument('--b', type=positive, metavar='N·s/m')
     coupler.add_argument(
         '--tolerance',
         type=positive,
@@ -111,6 +104,8 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     if (options.k is None) != (options.b is None):
         raise ValueError('give --k and --b together')
+    if options.k is not None and not (options.k > 0.0 and options.b > 0.0):
+        raise ValueError(f'--k and --b must be > 0, got {options.k:g} and {options.b:g}')
     if not options.tolerance < 100.0:
         raise ValueError(f'--tolerance must be below 100 %, got {options.tolerance:g}')
     if not options.band < 50.0:
@@ -187,13 +182,6 @@ def _of(parts: list[Part], kind: str) -> list[Part]:
 
 def _task(options: argparse.Namespace) -> Task:
     rig = chosen_params(options).rig
-    values = flatten(rig)
-    for name in ('mass', 'length', 'spokes'):
-        if (value := getattr(options, name)) is not None:
-            values |= {f'front.{name}': value, f'rear.{name}': value}
-    if options.slope_deg is not None:
-        values['slope'] = math.radians(options.slope_deg)
-    rig = build(RigParams, values)
     # At a front wheel's strike p is 1/2 − θ2/2α2.
     return Task(rig, default_seconds(rig), options.band / 100.0 * 2.0 * rig.rear.alpha)
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from dcdrw.console import Bar, interrupted_status, interruptible, number, phase_percent, positive
 from dcdrw.files import add_force, refuse_existing
-from dcdrw.suite.parameter_file import add_rig_options, read_parameter_file
+from dcdrw.suite.parameter_file import add_rig_options, with_rig_options
 from dcdrw.trials.shots import CODECS, Files, FilmParams, film
 from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.quantity import Field, Params, build, check, fields, flatten
@@ -109,9 +109,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _params(options: argparse.Namespace) -> FilmParams:
     """Preset, then rig file, then options."""
-    params = FilmParams(PRESETS[options.preset].rig)
-    if options.rig:
-        params = read_parameter_file(options.rig, params)
+    params = with_rig_options(options, FilmParams(PRESETS[options.preset].rig))
     rig, start = params.rig, params.simulator
     if options.initial_phase is not None:
         start = check(start._replace(initial_phase_percent=options.initial_phase), '--initial-phase')

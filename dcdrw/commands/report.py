@@ -4,8 +4,10 @@ import argparse
 import sys
 from pathlib import Path
 
+from dcdrw.console import add_json, check_json, in_words, tell
 from dcdrw.files import add_force, refuse_existing, write_csv, write_text
 from dcdrw.trials.day import STEP_COLUMNS, TRIAL_COLUMNS, RecordedTrial, new_name, open_trial, step_rows, table
+from dcdrw.trials.expectation import add_expect, expectation_status
 from dcdrw.trials.report_page import page
 from dcdrw.trials.results import SAMPLES_HEADER
 from dcdrw_msgs_py.topics import JOINT_STATES
@@ -30,6 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = _EPILOG
     parser.add_argument('recordings', type=Path, nargs='+', metavar='RECORDING')
     parser.add_argument('--out', type=Path, required=True, metavar='REPORT.html', help='the page to write')
+    add_json(parser)
+    add_expect(parser)
     add_force(parser)
     parser.add_argument('--title', default='Trials', metavar='TEXT', help='its heading (default: %(default)s)')
     parser.add_argument(
@@ -50,15 +54,17 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     tables = options.out.with_suffix('.csv')
     refuse_existing((options.out, tables), options.force)
+    check_json(options)
     trials: list[RecordedTrial] = []
+    lines: list[str] = []
     for path in options.recordings:
         try:
             trials.append(open_trial(path, new_name(path, trials), options.rig, options.topic))
-            print(f'{trials[-1].name}: {trials[-1].summary.sentence}')
+            lines.append(f'{trials[-1].name}: {trials[-1].summary.sentence}')
             for text in (*trials[-1].analysis.damage, *trials[-1].analysis.notes):
                 print(f'dcdrw report: {text}', file=sys.stderr)
         except (ValueError, OSError) as error:  # the other trials of the day are worth their page
-            print(f'dcdrw report: left out: {error}', file=sys.stderr)
+            print(f'dcdrw report: left out: {in_words(error)}', file=sys.stderr)
     if not trials:
         raise ValueError('none of the recordings can be read: there is nothing to report')
     small = {
@@ -77,6 +83,7 @@ def run(options: argparse.Namespace) -> int:
     )
     write_csv(tables / 'samples.csv', ('trial', *columns), samples, options.force)
     write_text(options.out, text, options.force)
-    print(f'Written: {options.out} and {tables}/')
+    lines.append(f'Written: {options.out} and {tables}/')
+    tell(options, lines, [{'trial': trial.name, **trial.summary._asdict()} for trial in trials])
     whole = len(trials) == len(options.recordings) and all(trial.summary.complete for trial in trials)
-    return 0 if whole else 1
+    return expectation_status(options.expect, (trial.summary.state for trial in trials)) if whole else 1

@@ -7,7 +7,8 @@ from concurrent.futures import CancelledError, Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
-from dcdrw.console import Bar, cores, count, positive
+from dcdrw.console import Bar, add_json, check_json, cores, count, positive, tell
+from dcdrw.files import add_force
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params
 from dcdrw_sim.map.regression import PHASES
 from dcdrw_sim.study.sweep import Axis, Sweep, default_axis, default_seconds
@@ -65,6 +66,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     where = parser.add_mutually_exclusive_group()
     where.add_argument('--workers', type=count, metavar='N', help='cores to use (default: all)')
     where.add_argument('--scheduler', metavar='ADDRESS', help='run on the Dask cluster of this scheduler')
+    add_json(parser)
+    add_force(parser)
     parser.set_defaults(preset='paper-sweep')
 
 
@@ -79,10 +82,17 @@ def axis(text: str) -> Axis:
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     require_extra('xarray', 'netCDF4', 'dask.array')
+    check_json(options)
     sweep = chosen_sweep(options)
     with _executor(options) as (executor, at_once), Bar('judging', 'points') as bar:
-        run_sweep(sweep, options.out, executor, at_once, lambda progress: bar.reach(*progress))
-    print(f'{options.out}: {summary(options.out)}')
+        run_sweep(sweep, options.out, executor, at_once, lambda progress: bar.reach(*progress), options.force)
+    verdicts = summary(options.out)
+    told = ', '.join(f'{number} {name}' for name, number in verdicts.items() if number)
+    tell(
+        options,
+        [f'{options.out}: {sum(verdicts.values())} points: {told}'],
+        {'file': str(options.out), 'points': verdicts},
+    )
     return 0
 
 
@@ -101,12 +111,11 @@ def chosen_sweep(options: argparse.Namespace) -> Sweep:
     )
 
 
-def summary(path: Path) -> str:
-    """How many points got which verdict."""
+def summary(path: Path) -> dict[str, int]:
+    """How many points got each verdict."""
     with open_sweep(path) as dataset:
         verdicts = dataset.verdict.values.ravel().tolist()
-    parts = ((verdicts.count(verdict), verdict.name.lower()) for verdict in Verdict)
-    return f'{len(verdicts)} points: ' + ', '.join(f'{number} {name}' for number, name in parts if number)
+    return {verdict.name.lower(): verdicts.count(verdict) for verdict in Verdict}
 
 
 @contextmanager

@@ -7,14 +7,16 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from dcdrw.console import Interrupted, interrupted_status
+from dcdrw.console import Interrupted, add_json, check_json, interrupted_status, tell, tell_where
+from dcdrw.drawings.figure_files import add_formats
 from dcdrw.files import add_force, free_folder, refuse_existing
 from dcdrw.recordings.bag_folder import RECORDING
 from dcdrw.recordings.joint_recording import record_joints
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw.trials.analysis import Analysis, analyze
+from dcdrw.trials.expectation import add_expect, expectation_status
 from dcdrw.trials.filmed import Film, add_film_arguments, debug_video, joint_batches, quality, write_frames
-from dcdrw.trials.results import write_results
+from dcdrw.trials.results import result, write_results
 from dcdrw.trials.summary import sentence
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_tracker.node.tag_tracker import Tracked
@@ -50,6 +52,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='FILE.mp4',
         help='make a video with tags, hubs, spokes and stance legs drawn in',
     )
+    add_formats(parser)
+    add_json(parser)
+    add_expect(parser)
     add_force(parser)
 
 
@@ -60,6 +65,7 @@ def run(options: argparse.Namespace) -> int:
     if options.rig:
         trial_params = read_parameter_file(options.rig, trial_params)
     folder = free_folder(options.out)
+    check_json(options)
     refuse_existing([options.debug] if options.debug else [], options.force)
     with ExitStack() as stack:
         debug = stack.enter_context(debug_video(options.debug, film, options.force)) if options.debug else None
@@ -82,33 +88,34 @@ def run(options: argparse.Namespace) -> int:
         )
     except ValueError as error:
         print(f'dcdrw track: {error}', file=sys.stderr)
-    return _finish(film, frames, trial, folder)
+    return _finish(film, frames, trial, folder, options)
 
 
-def _finish(film: Film, frames: Sequence[Tracked], trial: Analysis, folder: Path) -> int:
+def _finish(film: Film, frames: Sequence[Tracked], trial: Analysis, folder: Path, options: argparse.Namespace) -> int:
     """Tell and write what came of it."""
     told = quality(film, frames)
-    print(sentence(trial))
     missing = f'; {told["frames_missing"]} frames are missing' if told['frames_missing'] else ''
-    print(
-        f'{told["frames_with_both_wheels"]} of {told["frames"]} frames show both wheels{missing}. '
-        + '; '.join(
-            f'{name}: tags of {told[name]["tag_size_px"]:.0f} px, {told[name]["reprojection_error_px"]:.2f} px off, '
-            f'{sum(told[name]["outliers"].values())} outliers'
-            for name in (FRONT, REAR)
-        )
+    tags = '; '.join(
+        f'{name}: tags of {told[name]["tag_size_px"]:.0f} px, {told[name]["reprojection_error_px"]:.2f} px off, '
+        f'{sum(told[name]["outliers"].values())} outliers'
+        for name in (FRONT, REAR)
     )
+    both = f'{told["frames_with_both_wheels"]} of {told["frames"]} frames show both wheels{missing}. {tags}'
+    end = 'interrupted' if film.interrupted else film.complaint or 'complete'
+    more = {'end': end, 'video': str(film.path), 'tracking': told}
+    tell(options, [sentence(trial), both], result(trial, more))
     for line in _warnings(told):
         print(f'dcdrw track: {line}', file=sys.stderr)
-    end = 'interrupted' if film.interrupted else film.complaint or 'complete'
     try:
-        write_results(trial, folder, {'end': end, 'video': str(film.path), 'tracking': told})
+        write_results(trial, folder, more, formats=options.formats)
     except ValueError as error:
         print(f'dcdrw track: no picture: {error}', file=sys.stderr)
-    print(f'Written: {folder}/')
+    tell_where(options, f'Written: {folder}/')
     if film.complaint:
         print(f'dcdrw track: {film.complaint}; what came before is kept', file=sys.stderr)
-    return interrupted_status(film.interrupted) if film.interrupted else 1 if film.complaint else 0
+    if film.interrupted:
+        return interrupted_status(film.interrupted)
+    return 1 if film.complaint else expectation_status(options.expect, [trial.state])
 
 
 def _warnings(told: dict[str, Any]) -> Iterator[str]:

@@ -11,13 +11,28 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dcdrw.console import LiveLine, domain, interrupted_status, need, phase_percent, positive
+from dcdrw.console import (
+    STDOUT,
+    LiveLine,
+    add_json,
+    check_json,
+    domain,
+    in_words,
+    interrupted_status,
+    need,
+    phase_percent,
+    positive,
+    tell,
+    tell_where,
+)
+from dcdrw.drawings.figure_files import add_formats
 from dcdrw.files import free_folder
 from dcdrw.recordings.recorder import require_libraries
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params
 from dcdrw.suite.processes import free_domain
+from dcdrw.trials.expectation import add_expect, expectation_status
 from dcdrw.trials.filmed_rig import filmed_rig
-from dcdrw.trials.results import describe, write_results
+from dcdrw.trials.results import describe, result, write_results
 from dcdrw.trials.simulated import Course, SimulatedTrial
 from dcdrw.trials.summary import summarize
 from dcdrw_msgs_py.diagnosis import PairState
@@ -34,7 +49,8 @@ _EPILOG = """\
 The nodes run on a free ROS domain that only this machine sees, unless --domain names one. DIR gets the
 recording (for ros2 bag, dcdrw replay and dcdrw analyze), summary.json, trial.png, samples.csv, footfalls.csv and what
 each node printed. Exit status: 0 the trial ran to its end (whether or not the pair fell into step: see the summary),
-1 a node died, no data came, or the verdict rests on less than was recorded, 2 wrong input, 130 interrupted.
+1 a node died, no data came, or the verdict rests on less than was recorded, 2 wrong input,
+3 it did not end as --expect says, 130 interrupted.
 
 With --camera, joint_states come from pictures, as from a real rig: simulator, virtual_camera and tag_tracker run in a
 row. Where the camera stands and what its pictures are like are parameters of virtual_camera, in the file of --rig.
@@ -67,11 +83,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--domain', type=domain, metavar='N', help='ROS domain to use instead of a free one')
     parser.add_argument('--note', default='', metavar='TEXT', help='what to keep with the recording')
     parser.add_argument('--quiet', action='store_true', help='no live progress')
+    add_formats(parser)
+    add_json(parser)
+    add_expect(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     need('a trial', 'rclpy')
+    check_json(options)
     require_libraries()
     if options.camera:
         opencv()
@@ -97,7 +117,7 @@ def run(options: argparse.Namespace) -> int:
     folder = free_folder(options.out)
     folder.mkdir(parents=True, exist_ok=True)
     with (
-        _Screen(options.quiet) as screen,
+        _Screen(options.quiet or options.json == STDOUT) as screen,
         nullcontext(options.domain) if options.domain is not None else free_domain() as chosen,
     ):
         environment = {'ROS_DOMAIN_ID': str(chosen)}
@@ -106,7 +126,7 @@ def run(options: argparse.Namespace) -> int:
         course = SimulatedTrial(
             params, filmed, folder, environment, options.seconds, options.note, screen.say, screen.watch
         ).run()
-    return _finish(course, folder)
+    return _finish(course, folder, options)
 
 
 _STYLES = {
@@ -144,31 +164,26 @@ class _Screen(LiveLine):
         )
 
 
-def _finish(course: Course, folder: Path) -> int:
+def _finish(course: Course, folder: Path, options: argparse.Namespace) -> int:
     """Say and write what the trial came to; returns the exit status."""
     failure, trial, truth = course.failure, course.analysis, course.truth
     summary = summarize(trial)
-    print(summary.sentence)
-    if truth:
-        print(truth)
+    more = {
+        'end': course.end,
+        'agreement': describe(course.agreements),
+        'diagnostics': course.diagnoses,
+        **({'truth': truth._asdict()} if truth else {}),
+    }
     try:
-        write_results(
-            trial,
-            folder,
-            {
-                'end': course.end,
-                'agreement': describe(course.agreements),
-                'diagnostics': course.diagnoses,
-                **({'truth': truth._asdict()} if truth else {}),
-            },
-        )
-        print(f'Written: {folder}/')
+        tell(options, [summary.sentence, *([str(truth)] if truth else [])], result(trial, more))
+        write_results(trial, folder, more, formats=options.formats)
+        tell_where(options, f'Written: {folder}/')
     except ValueError as error:
         print(f'dcdrw trial: no picture: {error}', file=sys.stderr)
     except OSError as error:
-        failure = failure or f'{error.strerror}: {folder}'
+        failure = failure or in_words(error)
     if failure:
         print(f'dcdrw trial: {failure}', file=sys.stderr)
     if course.interrupted:
         return interrupted_status(course.interrupted)
-    return 0 if summary.complete and not failure else 1
+    return expectation_status(options.expect, [trial.state]) if summary.complete and not failure else 1

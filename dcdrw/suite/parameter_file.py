@@ -1,10 +1,12 @@
 """Rig files: ROS 2 parameter files, so that one file serves the command line and every node."""
 
 import argparse
-from collections.abc import Iterable, Iterator, Mapping
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
+from dcdrw.console import count, degrees, number
 from dcdrw.suite.executables import EXECUTABLES
 from dcdrw_msgs_py.quantity import build, fields, flatten, suggestion
 from dcdrw_msgs_py.rig import RigParams, WheelPitch, WheelShape
@@ -84,18 +86,59 @@ def read_parameter_file(path: Path, base: Sets) -> Sets:
     return type(base)(**sets)
 
 
+class RigOption(NamedTuple):
+    """An option that stands for parameters of a rig."""
+
+    parameters: tuple[str, ...]
+    read: Callable[[str], Any]
+    unit: str
+    help: str
+    scale: float = 1.0
+    """From the option's unit to the parameter's."""
+
+
+RIG_OPTIONS = {
+    '--k': RigOption(('k',), number, 'N/m', 'stiffness of the coupler'),
+    '--b': RigOption(('b',), number, 'N·s/m', 'damping of the coupler'),
+    '--slope-deg': RigOption(('slope',), degrees, 'DEG', 'slope, downhill', math.radians(1.0)),
+    '--mass': RigOption(('front.mass', 'rear.mass'), number, 'KG', 'of each wheel'),
+    '--length': RigOption(('front.length', 'rear.length'), number, 'M', 'of each wheel, hub to foot'),
+    '--spokes': RigOption(('front.spokes', 'rear.spokes'), count, 'N', 'of each wheel'),
+}
+
+
 def add_rig_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that choose a rig."""
     presets = '; '.join(f'{name}, {preset.doc}' for name, preset in PRESETS.items())
-    parser.add_argument(
-        '--preset', choices=PRESETS, default='paper', metavar='NAME', help=f'the rig: {presets} (default: %(default)s)'
+    group = parser.add_argument_group('the rig: a preset, then what a file changes, then what an option does')
+    group.add_argument('--preset', choices=PRESETS, default='paper', metavar='NAME', help=f'{presets} (default: paper)')
+    group.add_argument(
+        '--rig', type=Path, metavar='FILE.yaml', help='a ROS 2 parameter file, as config/rig.yaml; all may be left out'
     )
-    parser.add_argument(
-        '--rig',
-        type=Path,
-        metavar='FILE.yaml',
-        help='parameters that differ from the preset: a ROS 2 parameter file, as config/rig.yaml',
-    )
+    for name, option in RIG_OPTIONS.items():
+        group.add_argument(name, type=option.read, metavar=option.unit, help=option.help)
+
+
+def with_rig_options(options: argparse.Namespace, base: Sets) -> Sets:
+    """Parameter sets as --rig and the options of a rig change them.
+
+    Raises:
+        ValueError, OSError: as `read_parameter_file`.
+
+    """
+    if options.rig:
+        base = read_parameter_file(options.rig, base)
+    changed: dict[str, Any] = {}
+    for name, values in zip(base._fields, base, strict=True):  # type: ignore[attr-defined]
+        flat = changed[name] = flatten(values)
+        for text, option in RIG_OPTIONS.items():
+            value = getattr(options, text.strip('-').replace('-', '_'))
+            mine = set(option.parameters) & flat.keys()
+            if value is not None and mine:
+                flat.update(dict.fromkeys(mine, value * option.scale if option.scale != 1.0 else value))
+                build(type(values), flat, text)  # what is impossible is told with the option
+    kinds = {name: type(values) for name, values in zip(base._fields, base, strict=True)}  # type: ignore[attr-defined]
+    return type(base)(**{name: build(kinds[name], flat) for name, flat in changed.items()})
 
 
 def chosen_params(options: argparse.Namespace) -> TrialParams:
@@ -105,8 +148,7 @@ def chosen_params(options: argparse.Namespace) -> TrialParams:
         ValueError, OSError: as `read_parameter_file`.
 
     """
-    params = TrialParams.of_rig(PRESETS[options.preset].rig)
-    return read_parameter_file(options.rig, params) if options.rig else params
+    return with_rig_options(options, TrialParams.of_rig(PRESETS[options.preset].rig))
 
 
 def write_parameter_file(params: Iterable[tuple[Any, ...]], path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dcdrw.recordings.joint_batch import JointBatch
-from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
+from dcdrw.suite.parameter_file import TrialParams, with_rig_options
 from dcdrw.trials.analysis import Analysis
 from dcdrw_msgs_py.rig import WheelShape
 from dcdrw_msgs_py.rolling import steps_ahead
@@ -45,8 +45,7 @@ def filmed_rig(options: argparse.Namespace, params: TrialParams) -> FilmedRig:
     filmed = FilmedRig(
         SceneParams(front, rear, rig.S0, rig.slope), track=TrackParams(front, rear, rig.slope, rig.gravity)
     )
-    if options.rig:
-        filmed = read_parameter_file(options.rig, filmed)
+    filmed = with_rig_options(options, filmed)
     mounts(filmed.tags)
     filmed.look.check_occluder()
     filmed.shutter.check_encoding()

@@ -1,9 +1,10 @@
 """The results of a recorded trial: read and judged, held against what its nodes published, written into a folder."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from dcdrw.console import Bar
+from dcdrw.drawings.figure_files import figure_files
 from dcdrw.files import to_json, write_csv, write_text, write_whole
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.leg_recording import find_topic, leg_topics, namespace_of, wheel_batches
@@ -88,8 +89,19 @@ def describe(agreements: dict[str, Agreement]) -> dict[str, dict[str, int]]:
     return {topic: agreement._asdict() for topic, agreement in agreements.items()}
 
 
-def write_results(trial: Analysis, folder: Path, more: Mapping[str, object], force: bool = False) -> None:
-    """Write summary.json, samples.csv, footfalls.csv and, where there is something to draw, trial.png into a folder.
+def result(trial: Analysis, more: Mapping[str, object]) -> dict[str, object]:
+    """What summary.json holds."""
+    return {**more, **summarize(trial)._asdict()}
+
+
+def write_results(
+    trial: Analysis,
+    folder: Path,
+    more: Mapping[str, object],
+    force: bool = False,
+    formats: Sequence[str] = ('png',),
+) -> None:
+    """Write summary.json, samples.csv, footfalls.csv and, where there is something to draw, the picture of a trial.
 
     Raises:
         ValueError: there is no picture, for want of matplotlib; all else is written.
@@ -97,10 +109,11 @@ def write_results(trial: Analysis, folder: Path, more: Mapping[str, object], for
 
     """
     folder.mkdir(parents=True, exist_ok=True)
-    write_text(folder / 'summary.json', to_json({**more, **summarize(trial)._asdict()}), force)
+    write_text(folder / 'summary.json', to_json(result(trial, more)), force)
     samples = zip(*(getattr(trial.motion, name).tolist() for name in SAMPLES_HEADER), strict=True)
     write_csv(folder / 'samples.csv', SAMPLES_HEADER, samples, force)
     write_csv(folder / 'footfalls.csv', Footfall._fields, trial.footfalls, force)
     if trial.ran:
-        with write_whole(folder / 'trial.png', force) as unfinished:
-            draw_trial(trial, sentence(trial), unfinished)
+        for path in figure_files(folder, ['trial'], formats):
+            with write_whole(path, force) as unfinished:
+                draw_trial(trial, sentence(trial), unfinished)

@@ -48,6 +48,7 @@ def run_sweep(
     executor: Executor,
     at_once: int,
     report: Callable[[Progress], None] = lambda progress: None,
+    force: bool = False,
 ) -> None:
     """Compute a sweep into a netCDF file; one that was interrupted goes on where it was.
 
@@ -60,6 +61,7 @@ def run_sweep(
         executor: threads (the kernels let go of Python's lock), processes, or a Dask cluster's.
         at_once: how many blocks it may have to do at any time.
         report: called at the start and after every block.
+        force: overwrite a file that holds another sweep, or none.
 
     Raises:
         ValueError: an impossible sweep, another one at `path` or in its folder, or a library is missing.
@@ -68,7 +70,7 @@ def run_sweep(
     """
     require_extra('xarray', 'netCDF4', 'dask.array')
     check_sweep(sweep)
-    if is_complete(path, sweep):
+    if not force and is_complete(path, sweep):
         report(Progress(sweep.shape[0] * sweep.shape[1], sweep.shape[0] * sweep.shape[1]))
         return
     with _Parts.opened(path, sweep) as parts:

@@ -17,6 +17,7 @@ from rosbags.rosbag2.enums import CompressionMode
 
 from dcdrw.cli import main
 from dcdrw.recordings.recording import Recording
+from dcdrw.trials.expectation import UNEXPECTED
 from dcdrw.trials.results import read_trial
 from dcdrw_msgs_py.diagnosis import STEPS_TO_SYNCHRONIZATION
 from dcdrw_msgs_py.rig import RigParams
@@ -209,3 +210,12 @@ def test_analysis_needs_no_ros(motion, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith('From 35.0 %')
+
+
+def test_the_verdict_for_a_program_and_as_a_status(tmp_path, capsys, motion):
+    write_bag(tmp_path / 'bag', messages(motion[1]))
+    assert main(['analyze', '--json=-', '--expect', 'synchronized', str(tmp_path / 'bag')]) == 0
+    assert json.loads(capsys.readouterr().out)['state'] == 'synchronized'
+    assert main(['analyze', '--expect', 'stalled', str(tmp_path / 'bag')]) == UNEXPECTED
+    assert main(['analyze', '--json', str(tmp_path / 'both.json'), *[str(tmp_path / 'bag')] * 2]) == 0
+    assert [one['state'] for one in json.loads((tmp_path / 'both.json').read_text())] == ['synchronized'] * 2
