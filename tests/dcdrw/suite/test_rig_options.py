@@ -56,9 +56,7 @@ def test_what_is_impossible_is_told_with_its_option(arguments, message):
 
 def test_a_slope_in_degrees_is_asked_about(tmp_path):
     (tmp_path / 'rig.yaml').write_text('/**:\n  ros__parameters: {slope: 2}\n')
-    with pytest.raises(
-        ValueError, match=r'rad, got 2: degrees\? 2° is 0\.0349066 rad \(.*rig\.yaml\)'
-    ):
+    with pytest.raises(ValueError, match=r'rad, got 2: degrees\? 2° is 0\.0349066 rad \(.*rig\.yaml\)'):
         chosen('--rig', str(tmp_path / 'rig.yaml'))
 
 
