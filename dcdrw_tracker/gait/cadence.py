@@ -51,18 +51,12 @@ class Cadence:
         self._gaps = self._lost = self._longest_ns = 0
         self._last_ns: int | None = None
         self._beat: _Beat | None = None
+        self.period_ns = 0
+        """Mean time from sample to sample; 0 while unknown."""
+        self.burst = 1
+        """Samples that arrive together: 1 where they come one by one."""
         self._intervals: list[int] = []
         self._looks: tuple[int, ...] = LOOKS
-
-    @property
-    def period_ns(self) -> int:
-        """Mean time from sample to sample; 0 while unknown."""
-        return round(self._beat.period_ns / self._beat.size) if self._beat else 0
-
-    @property
-    def burst(self) -> int:
-        """Samples that arrive together: 1 where they come one by one."""
-        return round(self._beat.size) if self._beat else 1
 
     def tick(self, stamp_ns: int) -> None:
         """Take the next stamp; one that does not move on is ignored."""
@@ -77,7 +71,8 @@ class Cadence:
         intervals = self._intervals
         intervals.append(interval)
         if len(intervals) in self._looks:
-            self._beat = _learned(intervals)
+            self._beat = beat = _learned(intervals)
+            self.period_ns, self.burst = round(beat.period_ns / beat.size), round(beat.size)
             if len(intervals) == LOOKS[-1]:
                 self._settle()
                 self._looks = LOOKS[-1:]

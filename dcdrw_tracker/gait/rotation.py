@@ -14,6 +14,8 @@ LEAST_SLOPE_NS = 4_000_000
 """Over a shorter time a speed is none: samples of a burst are stamped as they arrive, one right after the other."""
 LEAST_COUNT = 1e-6
 """A finer encoder is none: rotations that are no multiples of a count [rad]."""
+LEARNING = 500
+"""Samples of a moving wheel from which the count is learned."""
 COUNTER = 2**16
 """Counts after which the usual counter of an encoder rolls over."""
 
@@ -63,6 +65,7 @@ class Rotation:
         self._raw = angle
         self._offset = 0.0
         """What the source has lost in whole turns, or as its counter rolled over: ψ minus the raw angle [rad]."""
+        self._unlearned = LEARNING
         self._count = math.inf
         """Angle of one count of the source's encoder; infinite before the wheel has turned, 0 where there is none."""
         self.rollovers = 0
@@ -171,7 +174,8 @@ class Rotation:
             self._offset = math.tau * turns if whole else psi - angle
         elif abs(angle) > math.tau + self.pitch:
             self._wraps = False
-        if self._count:
+        if turned and self._unlearned:
+            self._unlearned -= 1
             self._count = _common_divisor(self._count, abs(turned))
         strikes = self._strikes(elapsed_ns, psi, tolerance.hysteresis)
         self.rate = self._slope(stamp_ns, psi, bool(strikes), burst) if math.isnan(rate) else rate
@@ -225,7 +229,9 @@ class Rotation:
 def _common_divisor(one: float, other: float) -> float:
     """The largest angle of which both are multiples; 0 where it is less than `LEAST_COUNT`."""
     if math.isinf(one):
-        return other or one
+        return other
+    if not one:
+        return 0.0
     while other > 0.1 * LEAST_COUNT:
         one, other = other, abs(math.remainder(one, other))
     return one if one > LEAST_COUNT else 0.0

@@ -110,3 +110,36 @@ def test_namespace_and_remapping_work(bench):
     phases = bench.hear(PHASE_STATE, '/lab/phase_state')
     bench.start_ns = bench.node.get_clock().now().nanoseconds
     bench.wake(publisher, lambda now: held(bench, now), phases)
+
+
+def test_wheels_in_messages_of_their_own_are_joined(bench):
+    bench.start('phase_estimator')
+    bench.start_ns = bench.node.get_clock().now().nanoseconds
+    phases = bench.hear(PHASE_STATE)
+    publisher = bench.publisher(JOINT_STATES)
+    bench.wake(publisher, lambda now: held(bench, now), phases)
+    for k in range(1, 101):
+        for name in ('front_wheel', 'rear_wheel'):
+            publisher.publish(joints(bench, k, (name,)))
+            bench.spin(0.001)
+    bench.wait(lambda: len(phases) >= 100, '100 phases')
+    assert all(math.isclose(message.position[2], ALPHA, abs_tol=1e-9) for message in phases)
+
+
+def test_a_source_in_degrees_that_falls_downhill_is_mapped(bench):
+    bench.start('phase_estimator', unit='deg', front_sign=-1, rear_sign=-1)
+    bench.start_ns = bench.node.get_clock().now().nanoseconds
+    phases = bench.hear(PHASE_STATE)
+    publisher = bench.publisher(JOINT_STATES)
+
+    def turned(message: JointState) -> JointState:
+        message.position = [-math.degrees(angle) for angle in message.position]
+        message.velocity = [-math.degrees(rate) for rate in message.velocity]
+        return message
+
+    bench.wake(publisher, lambda now: turned(held(bench, now)), phases)
+    for k in range(1, 51):
+        publisher.publish(turned(joints(bench, k)))
+        bench.spin(0.002)
+    bench.wait(lambda: len(phases) >= 50, '50 phases')
+    assert all(math.isclose(message.position[2], ALPHA, abs_tol=1e-9) for message in phases)
