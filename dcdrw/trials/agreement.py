@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.recording import Recording
 from dcdrw.trials.analysis import Analysis, Floats, Integers
 from dcdrw_msgs_py.samples import run_of
@@ -15,6 +16,7 @@ from dcdrw_msgs_py.topics import (
     PHASE_STATE,
     PHI_JOINT,
     REAR_STANCE,
+    RESTARTS,
     STEP_DIFFERENCE_JOINT,
     SYNC_ERROR,
     SYNC_ERROR_PERCENT,
@@ -82,13 +84,20 @@ def _read(recording: Recording, name: str) -> tuple[Integers, _Phases]:
             continue
         places = [batch.names.index(joint) for joint in _JOINTS]
         numbers = np.stack([batch.position[:, places[:3]], batch.velocity[:, places[:3]]], axis=2)
-        runs.append(np.full(batch.messages, run_of(batch.frame)))
+        runs.append(_restarts(batch))
         parts.append(
             _Phases(batch.stamp_ns, numbers.reshape(batch.messages, 6), batch.position[:, places[3]].astype(np.int64))
         )
     if not parts:
         return np.empty(0, np.int64), _Phases(np.empty(0, np.int64), np.empty((0, 6)), np.empty(0, np.int64))
     return np.concatenate(runs), _Phases(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def _restarts(batch: JointBatch) -> Integers:
+    """How often the source had started anew; older recordings tell it in the frame."""
+    if RESTARTS in batch.names:
+        return batch.position[:, batch.names.index(RESTARTS)].astype(np.int64)
+    return np.full(batch.messages, run_of(batch.frame))
 
 
 def _runs(numbers: NDArray[np.int64], phases: _Phases) -> Iterator[_Phases]:

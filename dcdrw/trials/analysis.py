@@ -210,7 +210,7 @@ class _Trial:
         if not rows:
             return
         taken, (front_scale, rear_scale) = np.array(rows), joints.scales
-        _, front_turns, rear_turns, phis, differences, restarts = zip(*phases, strict=True)
+        _, front_turns, rear_turns, phis, differences, restarts, *_ = zip(*phases, strict=True)
         if joints.coupler_joint in batch.names:
             coupler = batch.names.index(joints.coupler_joint)
             known = [table[taken, coupler] for table in (batch.position, batch.velocity, batch.effort)]
