@@ -32,6 +32,17 @@ JOINT_STATES = Topic(
 COUPLER_FORCE_COMMAND = Topic(
     'coupler_force_command', 'std_msgs/msg/Float64', 'force added to the coupler, N; zero when stale'
 )
+REAR_TORQUE_COMMAND = Topic(
+    'rear_torque_command',
+    'std_msgs/msg/Float64',
+    'torque on the rear hub, N·m, positive rolls downhill; zero when stale',
+)
+PERSON_FORCE = Topic(
+    'person_force',
+    'geometry_msgs/msg/WrenchStamped',
+    "the coupler's force on the person, stamped: force.x in N, positive where it pushes forward",
+    SAMPLE_DEPTH,
+)
 ENABLE = Topic('enable', 'std_msgs/msg/Bool', 'heartbeat of at least 10 Hz that lets the robot push; expired is false')
 COUPLER_WRENCH = Topic(
     'coupler_wrench', 'geometry_msgs/msg/WrenchStamped', 'the commanded force, stamped: force.x in N, tension positive'

@@ -10,6 +10,7 @@ from dcdrw_msgs_py.samples import CouplerSample, JointSample, Turn
 from dcdrw_sim.model.dynamics import State
 from dcdrw_sim.model.start import Start, start
 from dcdrw_sim.motion.pair import Simulation
+from dcdrw_sim.rig.person import SERVO_SECONDS, Person, PersonParams
 
 FROM_PHASE = 'from initial_phase_percent'
 
@@ -35,9 +36,10 @@ class SimulatorParams(NamedTuple):
     )
     drop_percent: Annotated[float, Quantity('samples lost at random', '%', low=0.0, high=100.0, live=True)] = 0.0
     seed: Annotated[int, Quantity('of noise and losses', low=0)] = 0
-    command_timeout: Annotated[
-        float, Quantity('a coupler_force_command older than this counts as 0', 's', above=0.0, live=True)
-    ] = 0.08
+    command_timeout: Annotated[float, Quantity('a command older than this counts as 0', 's', above=0.0, live=True)] = (
+        0.08
+    )
+    person: PersonParams = PersonParams()
 
     def check_pace(self) -> None:
         """Refuse a pace that leaves the clock behind.
@@ -70,7 +72,7 @@ class SimulatedRig:
     """A rig in simulation, read at times of the caller's choice.
 
     Raises:
-        ValueError: the rig or its start is impossible.
+        ValueError: the rig, its start or the person's walk is impossible.
 
     """
 
@@ -82,7 +84,11 @@ class SimulatedRig:
 
     def reset(self) -> None:
         """Put the wheels back to the start; time is 0 again."""
-        self.simulation = Simulation(*self.params.start(self._rig))
+        params = self.params
+        rig, state = params.start(self._rig)
+        self.simulation = Simulation(rig, state)
+        self._person = Person(params.person, rig, float(state.theta1), params.seed) if params.person.walks else None
+        self._servo_ticks = 0
 
     def configure(self, rig: RigParams) -> None:
         """Take a changed coupler or slope from now on.
@@ -93,6 +99,15 @@ class SimulatedRig:
         """
         self.simulation.rig = rig
         self._rig = rig
+
+    @property
+    def rear_torque(self) -> float:
+        """Torque on the rear hub, positive where it rolls it downhill [N·m]; held until it is changed."""
+        return self.simulation.torques[1]
+
+    @rear_torque.setter
+    def rear_torque(self, torque: float) -> None:
+        self.simulation.torques = self.simulation.torques[0], torque
 
     def read(self, t: float, stamp_ns: int, held: bool = False) -> JointSample | None:
         """The joints at a time t [s], not before the last one; None where the sample is lost.
@@ -106,6 +121,8 @@ class SimulatedRig:
             MotionError: the hubs met on the way, or the motion is too fast to follow.
 
         """
+        if not held:
+            self._walk_to(t)
         params, motion = self.params, self.simulation.advance_to(t)
         if params.drop_percent and self._random.random() * 100.0 < params.drop_percent:
             return None
@@ -126,6 +143,18 @@ class SimulatedRig:
             Turn(rotation2, motion.omega2),
             CouplerSample(motion.length, motion.rate, motion.force),
         )
+
+    def prepare(self, t: float) -> None:
+        """Do now the costly part of the way to a time [s] that is about to be read, as `Simulation.prepare`."""
+        self.simulation.prepare(min(t, self._servo_ticks * SERVO_SECONDS) if self._person else t)
+
+    def _walk_to(self, t: float) -> None:
+        """Sample the person's servo whenever it is due up to a time [s]."""
+        while self._person and (due := self._servo_ticks * SERVO_SECONDS) <= t:
+            motion = self.simulation.advance_to(due)
+            torque = self._person.torque(due, motion.rotation1, motion.omega1)
+            self.simulation.torques = torque, self.rear_torque
+            self._servo_ticks += 1
 
 
 class Timeline:

@@ -4,8 +4,10 @@ import math
 import sys
 import time
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
+from geometry_msgs.msg import WrenchStamped
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock as ClockMessage
 from std_srvs.srv import SetBool, Trigger
@@ -15,7 +17,7 @@ from dcdrw_msgs_py.messages import JointSampleWriter, to_stamp
 from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
 from dcdrw_msgs_py.samples import SECOND
-from dcdrw_msgs_py.topics import CLOCK, COUPLER_FORCE_COMMAND, JOINT_STATES
+from dcdrw_msgs_py.topics import CLOCK, COUPLER_FORCE_COMMAND, JOINT_STATES, PERSON_FORCE, REAR_TORQUE_COMMAND, Topic
 from dcdrw_sim.motion.ends import MotionError, accept
 from dcdrw_sim.rig.simulator import SimulatedRig, SimulatorParams, Timeline
 
@@ -51,11 +53,13 @@ class SimulatorNode(Node):
         self._paused = params.paused
         self._failure = ''
         self._refused_commands = 0
-        self._command_age = Age()
+        self._commands = {COUPLER_FORCE_COMMAND: Age(), REAR_TORQUE_COMMAND: Age()}
         self._writer = JointSampleWriter()
         self._joint_states = advertise(self, JOINT_STATES)
         self._clock_publisher = advertise(self, CLOCK) if params.publish_clock else None
-        listen(self, COUPLER_FORCE_COMMAND, self._on_command)
+        self._person_force = advertise(self, PERSON_FORCE) if params.person.walks else None
+        for topic in self._commands:
+            listen(self, topic, partial(self._on_command, topic))
         self.create_service(Trigger, '~/reset', self._on_reset)
         self.create_service(SetBool, '~/pause', self._on_pause)
         self._report = report(self, self._diagnose)
@@ -102,9 +106,9 @@ class SimulatorNode(Node):
         if self._failure or (self._paused and self._clock_publisher):  # simulated time stands still
             self._timeline.restart_clock(now)
             return
-        stale = self._command_age.seconds > self._settings.value.command_timeout
-        if stale and self._rig.simulation.external_force:
-            self._rig.simulation.external_force = 0.0
+        for topic, age in self._commands.items():
+            if age.seconds > self._settings.value.command_timeout:
+                self._obey(topic, 0.0)
         reached = self._timeline.reached(now)
         end = time.monotonic() + BURST_SECONDS
         for _ in range(self._burst()):
@@ -113,7 +117,7 @@ class SimulatorNode(Node):
             self._publish()
         if not self._paused and self._period() <= PREPARE_WITHIN:
             with suppress(MotionError):  # told when the sample is due
-                self._rig.simulation.prepare(self._timeline.rig_time)
+                self._rig.prepare(self._timeline.rig_time)
 
     def _publish(self) -> None:
         timeline = self._timeline
@@ -131,6 +135,11 @@ class SimulatorNode(Node):
             self._next_clock = due + 1.0 / CLOCK_RATE - 1e-9
         if sample:
             self._joint_states.publish(self._writer.write(sample))
+            if self._person_force:
+                wrench = WrenchStamped()
+                wrench.header.stamp = to_stamp(stamp_ns)
+                wrench.wrench.force.x = -sample.coupler.force
+                self._person_force.publish(wrench)
         timeline.step(self._paused)
 
     def _configure(self, params: SimulatorParams) -> None:
@@ -138,14 +147,21 @@ class SimulatorNode(Node):
         self._timeline.configure(params.rate, params.real_time_factor, self._now())
         self._timer.timer_period_ns = round(self._period() * SECOND)
 
-    def _on_command(self, message: Any) -> None:
+    def _on_command(self, topic: Topic, message: Any) -> None:
         try:
-            self._rig.simulation.external_force = message.data
+            self._obey(topic, message.data)
         except ValueError as error:
             self._refused_commands += 1
-            self.get_logger().warning(f'coupler_force_command: {error}', throttle_duration_sec=1.0)
+            self.get_logger().warning(f'{topic.name}: {error}', throttle_duration_sec=1.0)
             return
-        self._command_age.renew()
+        self._commands[topic].renew()
+
+    def _obey(self, topic: Topic, value: float) -> None:
+        """Let a command act on the rig from now on."""
+        if topic is REAR_TORQUE_COMMAND:
+            self._rig.rear_torque = value
+        else:
+            self._rig.simulation.external_force = value
 
     def _on_reset(self, request: Any, response: Any) -> Any:
         try:
@@ -186,6 +202,7 @@ class SimulatorNode(Node):
                 'behind the pace [s]': max(behind, 0.0),
                 STEP_DIFFERENCE: simulation.steps[0] - simulation.steps[1],
                 'external force [N]': simulation.external_force,
+                'rear torque [N·m]': self._rig.rear_torque,
                 'commands refused': self._refused_commands,
             },
         )

@@ -12,9 +12,16 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
 
-from dcdrw_msgs_py.messages import SECOND, JointSampleReader, stamp_ns, to_stamp
+from dcdrw_msgs_py.messages import SECOND, JointSampleReader, diagnoses, stamp_ns, to_stamp
 from dcdrw_msgs_py.rig import RigParams
-from dcdrw_msgs_py.topics import CLOCK, COUPLER_FORCE_COMMAND, JOINT_STATES
+from dcdrw_msgs_py.topics import (
+    CLOCK,
+    COUPLER_FORCE_COMMAND,
+    DIAGNOSTICS,
+    JOINT_STATES,
+    PERSON_FORCE,
+    REAR_TORQUE_COMMAND,
+)
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatorParams
 from tests.bench import Bench
@@ -133,6 +140,38 @@ def test_command_adds_to_the_coupler_force_until_it_is_stale(bench):
     publisher.publish(Float64(data=math.nan))  # refused; the last good one holds until it is stale
     bench.wait(lambda: samples(heard)[-1].coupler.force == 0.0, 'the end of the stale command')
     assert 'external_force must be finite' in bench.output('simulator')
+
+
+def test_a_torque_drives_the_rear_hub_until_it_is_stale(bench):
+    alpha = RigParams().front.alpha
+    standing = {'theta1': -alpha, 'omega1': 0.0, 'theta2': -alpha, 'omega2': 0.0}
+    bench.start('simulator', rate=100, slope=0, k=0, b=0, command_timeout=0.3, **standing)
+    publisher, heard, said = bench.publisher(REAR_TORQUE_COMMAND), bench.hear(JOINT_STATES), bench.hear(DIAGNOSTICS)
+
+    def rolls():
+        publisher.publish(Float64(data=40.0))
+        bench.spin(0.02)
+        return heard and samples(heard)[-1].rear.rate > 0.5
+
+    bench.wait(rolls, 'the rear wheel to roll')
+    assert samples(heard)[-1].front.rate == 0.0
+    said.clear()
+    bench.wait(
+        lambda: any(one.number('rear torque [N·m]') == 0.0 for message in said for one in diagnoses(message).values()),
+        'the end of the stale torque',
+    )
+
+
+def test_the_force_on_the_person_is_the_coupler_s_with_the_other_sign(bench):
+    bench.start('simulator', rate=100, **{'person.walks': True})
+    forces, heard = bench.hear(PERSON_FORCE), bench.hear(JOINT_STATES)
+    bench.wait(lambda: len(forces) > 100, 'a second of forces')
+    coupler = {sample.stamp_ns: sample.coupler.force for sample in samples(heard)}
+    of_both = [
+        (coupler[stamp], one.wrench.force.x) for one in forces if (stamp := stamp_ns(one.header.stamp)) in coupler
+    ]
+    assert len(of_both) > 50
+    assert all(force == -on_person for force, on_person in of_both)
 
 
 def test_clock_runs_with_the_samples_and_starts_again_at_a_reset(bench):
