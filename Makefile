@@ -14,10 +14,11 @@ endif
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: help trial test lint format bench clean
+.PHONY: help trial test fuzz lint format bench clean
 help:
 	@echo 'make trial   run the paper'"'"'s trial in simulation and draw it (into trials/)'
 	@echo 'make test    run every test'
+	@echo 'make fuzz    damaged files before every reader, 100,000 (an hour)'
 	@echo 'make lint    ruff and mypy --strict'
 	@echo 'make format  ruff format'
 	@echo 'make bench   print the tables of speed (minutes)'
@@ -35,6 +36,9 @@ else
 	@$(BIN)/python -m pytest --numprocesses 2 --dist worksteal -m 'not processes'
 	@$(BIN)/python -m pytest --reruns 1 -m processes
 endif
+
+fuzz: $(READY)
+	@$(BIN)/python -m tests.fuzz $(ARGS)
 
 lint: $(READY)
 	@$(BIN)/ruff check .

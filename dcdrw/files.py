@@ -26,7 +26,7 @@ def refuse_existing(paths: Iterable[Path], force: bool = False) -> None:
 
     """
     for path in () if force else paths:
-        if path.exists():
+        if path.exists() and not _is_device(path):
             raise ValueError(f'{path} exists already, not overwriting (--force does)')
 
 
@@ -45,6 +45,10 @@ def free_folder(chosen: Path | None, parent: str = 'trials') -> Path:
     return folder
 
 
+def _is_device(path: Path) -> bool:
+    return path.exists() and not path.is_file() and not path.is_dir()
+
+
 @contextmanager
 def write_whole(path: Path, force: bool = False) -> Iterator[Path]:
     """A path beside `path`, with its ending, to write to; it gets its final name once all is on the disk.
@@ -56,6 +60,9 @@ def write_whole(path: Path, force: bool = False) -> Iterator[Path]:
         OSError: the file cannot be written; the message names `path`.
 
     """
+    if _is_device(path):  # /dev/null, say: nothing takes its place
+        yield path
+        return
     unfinished = path.with_name(f'.{path.stem}.{os.getpid()}{path.suffix}')
     try:
         yield unfinished

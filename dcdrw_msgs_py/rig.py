@@ -11,7 +11,7 @@ REAR = 'rear'
 
 
 Length = Annotated[float, Quantity('hub to foot, ℓ', 'm', above=0.0)]
-Spokes = Annotated[float, Quantity('number of spokes, π/α; need not be whole', low=4.0)]
+Spokes = Annotated[float, Quantity('number of spokes, π/α; need not be whole', low=4.0, high=1000.0)]
 
 
 class WheelPitch(NamedTuple):

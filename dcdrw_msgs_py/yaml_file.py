@@ -11,8 +11,10 @@ from typing import Any
 
 import yaml
 
-LARGEST_FILE = 16 * 2**20
-"""A larger file is none of ours [bytes]."""
+from dcdrw_msgs_py.text_file import read_text
+
+MOST_VALUES = 100_000
+"""Values and names that are read."""
 DEEPEST = 64
 """Levels of nesting that are read."""
 
@@ -56,7 +58,15 @@ class _Scalars:
 
 
 class _Loader(_Scalars, getattr(yaml, 'CSafeLoader', yaml.SafeLoader)):  # type: ignore[misc]
-    pass
+    def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+        """Refuse a name that stands twice: which of the two is meant nobody knows."""
+        seen = set()
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode):
+                if key.value in seen:
+                    raise ValueError(f'line {key.start_mark.line + 1} has {key.value} for the second time')
+                seen.add(key.value)
+        return super().construct_mapping(node, deep)
 
 
 class _Dumper(_Scalars, getattr(yaml, 'CSafeDumper', yaml.SafeDumper)):  # type: ignore[misc]
@@ -96,12 +106,9 @@ def read_yaml(path: Path) -> Any:
         OSError: the file cannot be read.
 
     """
-    with Path(path).open('rb') as file:
-        data = file.read(LARGEST_FILE + 1)
-    if len(data) > LARGEST_FILE:
-        raise ValueError(f'{path} is larger than {LARGEST_FILE // 2**20} MB: is it the right file?')
+    text = read_text(path)
     try:
-        return parse_yaml(data.decode('utf-8-sig'))
+        return parse_yaml(text)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise ValueError(f'{path} is not YAML: {" ".join(str(error).split())}') from None
 
@@ -116,7 +123,9 @@ def parse_yaml(text: str) -> Any:
     if text.startswith('%YAML:'):  # OpenCV's own spelling of the directive
         text = text.partition('\n')[2]
     depth = 0
-    for event in yaml.parse(text, _Loader):
+    for count, event in enumerate(yaml.parse(text, _Loader)):
+        if count > MOST_VALUES:
+            raise ValueError(f'it has more than {MOST_VALUES} values: is it the right file?')
         if isinstance(event, yaml.AliasEvent):
             raise ValueError(f'line {event.start_mark.line + 1} has the alias *{event.anchor}: write its value there')
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)

@@ -39,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='NAME',
         help='where the joint states are, in any namespace (default: %(default)s)',
     )
+    parser.add_argument('--namespace', default='', metavar='NS', help='of the suite, where several were recorded')
     parser.add_argument(
         '--out',
         type=Path,
@@ -70,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
     states: list[PairState] = []
     for path, folder in zip(options.recordings, folders, strict=True):
         try:
-            trial, agreements = read_trial(path, rig=options.rig, topic=options.topic)
+            trial, agreements = read_trial(path, rig=options.rig, topic=options.topic, namespace=options.namespace)
         except (ValueError, OSError) as error:
             if not several:
                 raise

@@ -1,10 +1,9 @@
 """`dcdrw design`: which spring and which dashpot to buy for a rig, and what if they are not what they say."""
 
 import argparse
-import csv
 import math
 from collections.abc import Iterator
-from itertools import product
+from itertools import product, zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,6 +15,7 @@ from dcdrw.files import add_force, refuse_existing, to_json, write_text, write_w
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.text_file import read_rows
 from dcdrw_sim.figures.style import new_figure, save
 from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.study.design import (
@@ -152,11 +152,11 @@ def read_parts(path: Path) -> list[Part]:
         OSError: it cannot be read.
 
     """
-    with path.open(encoding='utf-8-sig', newline='') as file:
-        rows = csv.DictReader(file)
-        if not {'kind', 'value'} <= set(rows.fieldnames or ()):
-            raise ValueError(f'{path} must begin with the header kind,value,name, got {rows.fieldnames}')
-        parts = [_part(row, f'{path}, line {rows.line_num}') for row in rows]
+    rows = read_rows(path)
+    _, names = next(rows, (0, []))
+    if not {'kind', 'value'} <= set(names):
+        raise ValueError(f'{path} must begin with the header kind,value,name, got {",".join(names)[:80]!r}')
+    parts = [_part(dict(zip_longest(names, row[: len(names)])), f'{path}, line {line}') for line, row in rows]
     for kind in ('spring', 'dashpot'):
         if not any(part.kind == kind for part in parts):
             raise ValueError(f'{path} has no {kind}')

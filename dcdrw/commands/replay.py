@@ -52,7 +52,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='NAME',
         help='where the joint states are, in any namespace (default: %(default)s)',
     )
-    parser.add_argument('--namespace', default='', metavar='NS', help='of the topics to publish')
+    parser.add_argument('--namespace', default='', metavar='NS', help='of the suite, where several were recorded')
+    parser.add_argument('--into', default='', metavar='NS', help='namespace of the topics to publish')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -66,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
 
     names = _names(options.rig)
     with Recording(options.recording) as recording:
-        topic = recording.find(options.topic)
+        topic = recording.find(options.topic, namespace=options.namespace)
         part = Part(*_window(options, recording), options.rate, options.loop)
         node: ReplayNode | None = None
 
@@ -84,7 +85,7 @@ def run(options: argparse.Namespace) -> int:
             if node and node.done:
                 rclpy.shutdown()
 
-        namespace = ['-r', f'__ns:=/{options.namespace.strip("/")}'] if options.namespace else []
+        namespace = ['-r', f'__ns:=/{options.into.strip("/")}'] if options.into else []
         with LiveLine() as line:
             status = run_node('dcdrw replay', make, ['--ros-args', *namespace])
         if node is None:

@@ -48,6 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='NAME',
         help='where the joint states are, in any namespace (default: %(default)s)',
     )
+    parser.add_argument('--namespace', default='', metavar='NS', help='of the suite, where several were recorded')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -59,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
     lines: list[str] = []
     for path in options.recordings:
         try:
-            trials.append(open_trial(path, new_name(path, trials), options.rig, options.topic))
+            trials.append(open_trial(path, new_name(path, trials), options.rig, options.topic, options.namespace))
             lines.append(f'{trials[-1].name}: {trials[-1].summary.sentence}')
             for text in (*trials[-1].analysis.damage, *trials[-1].analysis.notes):
                 print(f'dcdrw report: {text}', file=sys.stderr)

@@ -188,7 +188,8 @@ class RecorderNode(Node):
                 if value == value
             }
         }  # NaN: derived from others
-        text = yaml_text(self._parameters)
+        space = self.get_namespace().rstrip('/')  # nodes take parameters only under their whole name
+        text = yaml_text({f'{space}/{name}' if space else name: values for name, values in self._parameters.items()})
         self.recorder.about['parameters'] = text
         try:
             write_whole(self.recorder.folder / PARAMETERS, text)

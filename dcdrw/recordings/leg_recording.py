@@ -46,12 +46,8 @@ def leg_readings(recording: Recording, hips: Sequence[str]) -> Iterator[LegReadi
         hips: names of the hips in leg_joint_states, in the order of LEGS.
 
     """
-    from rosbags.typesys import Stores, get_typestore
-
-    types = get_typestore(Stores.ROS2_JAZZY)
     sensors = {find_topic(recording, topic): key for key, topic in LEG_SENSORS.items()}
-    for topic, log_ns, data in recording.messages(leg_topics(recording)):
-        message: Any = types.deserialize_cdr(data, recording.types[topic])
+    for topic, log_ns, message in recording.decoded(leg_topics(recording)):
         # A Bool has no stamp of its own: it is of the time of its arrival, as for the node.
         stamp_ns = _stamp_ns(message.header.stamp) if hasattr(message, 'header') else log_ns
         if topic in sensors:

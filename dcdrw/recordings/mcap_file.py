@@ -389,7 +389,10 @@ class McapFile(BagFile):
             if kind == Opcode.MESSAGE:
                 if whole:
                     _, _, channel, _, log_ns = _MESSAGE.unpack_from(data, at)
-                    yield channel, log_ns, data[at + _MESSAGE_HEAD : end]
+                    if log_ns < 2**63:
+                        yield channel, log_ns, data[at + _MESSAGE_HEAD : end]
+                    else:
+                        self._note(('time', piece.record), f'a message at byte {piece.record} has no possible time')
             elif kind in (Opcode.SCHEMA, Opcode.CHANNEL) and length <= _LONGEST_TEXT:
                 self._describe(kind, data[begin:end], lost=not whole)
             at = end

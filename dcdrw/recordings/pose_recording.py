@@ -58,14 +58,11 @@ def _kind(found: JointSample | str) -> int | str:
 
 def _followed(recording: Recording, params: PoseTracking) -> Iterator[JointSample | str]:
     """Joint states, and in the place of poses that are of no use why."""
-    from rosbags.typesys import Stores, get_typestore
-
-    types = get_typestore(Stores.ROS2_JAZZY)
     pairs, angles = PosePairs(params.bodies, params.track.slope), WheelAngles(params.track)
     wheels = dict(zip(pose_topics(recording), (FRONT, REAR), strict=True))
-    for topic, _, data in recording.messages(list(wheels)):
+    for topic, _, message in recording.decoded(list(wheels)):
         try:
-            views = pairs.take(wheels[topic], _pose(types.deserialize_cdr(data, FRONT_POSE.type)))
+            views = pairs.take(wheels[topic], _pose(message))
         except ValueError as error:
             yield f'{topic}: {error}'
             continue

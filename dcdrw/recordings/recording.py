@@ -6,6 +6,7 @@ from contextlib import AbstractContextManager, ExitStack
 from itertools import groupby, islice
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 from dcdrw.recordings.bag_file import CDR, BagFile, Message, RecordedTopic
 from dcdrw.recordings.bag_folder import COMPRESSIONS, find_bag
@@ -101,23 +102,29 @@ class Recording(AbstractContextManager['Recording']):
         """How many messages a topic has."""
         return sum(file.counts.get(topic, 0) for file in self._files)
 
-    def find(self, name: str, kind: str = JOINT_STATE) -> str:
-        """The topic of this name, in whatever namespace.
+    def find(self, name: str, kind: str = JOINT_STATE, namespace: str = '') -> str:
+        """The topic of this name, in this namespace, or in whatever one there is.
 
         Raises:
             ValueError: there is none, or one in several namespaces.
 
         """
+        end = f'/{namespace}/{name}'.replace('//', '/') if namespace.strip('/') else f'/{name.lstrip("/")}'
         found = [
             topic
             for topic, its in self.types.items()
-            if its == kind and (topic == name or topic.endswith(f'/{name.lstrip("/")}'))
+            if its == kind and (topic == name or (topic == end if namespace else topic.endswith(end)))
         ]
         if len(found) == 1:
             return found[0]
+        if found:
+            spaces = sorted(topic.removesuffix(end) or '/' for topic in found)
+            raise ValueError(
+                f'{self.path} has several suites with {name}: choose one with --namespace {" or ".join(spaces)}'
+            )
         others = ', '.join(topic for topic, its in self.types.items() if its == kind) or 'none'
         raise ValueError(
-            f'{self.path} has {"several topics" if found else "no topic"} {name} of {kind}; '
+            f'{self.path} has no topic {name} of {kind}{f" in {namespace}" if namespace else ""}; '
             f'of this type it has: {others}'
         )
 
@@ -133,6 +140,20 @@ class Recording(AbstractContextManager['Recording']):
         for _, group in groupby(messages, lambda message: len(message[1])):
             while batch := list(islice(group, BATCH)):
                 yield from decode_joints([data for _, data in batch], [log_ns for log_ns, _ in batch])
+
+    def decoded(self, topics: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
+        """The messages of these topics as rosbags decodes them: topic, log time, message; damaged ones are left out."""
+        from rosbags.typesys import Stores, get_typestore
+
+        types = get_typestore(Stores.ROS2_JAZZY)
+        for topic, log_ns, data in self.messages(topics):
+            try:
+                message = types.deserialize_cdr(data, self.types[topic])
+            except Exception:  # of any kind, for the content may be anything
+                text = f'{self.path}: messages of {topic} are malformed'
+                self._lost.extend([] if text in self._lost else [text])
+                continue
+            yield topic, log_ns, message
 
     def _open(self, path: Path) -> None:
         """Open a file; one that is none costs only itself where there are others."""

@@ -47,12 +47,13 @@ class TrialParams(NamedTuple):
         )
 
 
-def read_parameter_file(path: Path, base: Sets) -> Sets:
+def read_parameter_file(path: Path, base: Sets, namespace: str = '') -> Sets:
     """Read a parameter file as the nodes will; what it does not name is as in `base`.
 
     Args:
         path: the file.
         base: parameter sets by name, as `TrialParams`; each must be an executable's.
+        namespace: of the nodes, where the file has those of several suites.
 
     Raises:
         ValueError: not YAML, not a parameter file, an unknown or impossible parameter: named with the file.
@@ -65,25 +66,45 @@ def read_parameter_file(path: Path, base: Sets) -> Sets:
             f'{path} is not a parameter file: it must have the form of config/rig.yaml, '
             f'"{_EVERY_NODE}:", "{_PARAMETERS}:", then the parameters'
         )
-    sections = {_EVERY_NODE, *_NODES, *(f'/{node}' for node in _NODES)}
-    for section in content:
-        if section not in sections:
-            known = (_EVERY_NODE, *_NODES)
-            raise ValueError(f'{path} has parameters for {section}, which no trial has{suggestion(section, known)}')
+    sections = _sections(content, path, namespace)
     kinds = {name: type(values) for name, values in zip(base._fields, base, strict=True)}  # type: ignore[attr-defined]
     all_names = {field.name for kind in _NODES_OF for field in fields(kind)}.union(_OF_ROS)
     sets: dict[str, Any] = {}
     for name, kind in kinds.items():
         mine = {field.name for field in fields(kind)}
-        own = (name for node in _NODES_OF[kind] for name in (node, f'/{node}'))
-        values = {
-            key: value
-            for section in (_EVERY_NODE, *own)
-            for key, value in _flatten(content.get(section, {}).get(_PARAMETERS) or {})
-        }
+        values: dict[str, Any] = {}
+        for node in (_EVERY_NODE, *_NODES_OF[kind]):
+            values |= sections.get(node, {})
         chosen = {key: value for key, value in values.items() if key in mine or key not in all_names}
         sets[name] = build(kind, flatten(getattr(base, name)) | chosen, str(path))
     return type(base)(**sets)
+
+
+def _sections(content: Mapping[str, Any], path: Path, namespace: str) -> dict[str, dict[str, Any]]:
+    """Parameters by node, whatever the namespace before its name, as long as it is one."""
+    known = (_EVERY_NODE, *_NODES)
+    places: list[tuple[str, str, str]] = []
+    for section in map(str, content):
+        space, _, node = ('', '', _EVERY_NODE) if section == _EVERY_NODE else section.rpartition('/')
+        if node not in known:
+            raise ValueError(f'{path} has parameters for {section}, which no trial has{suggestion(node, known)}')
+        places.append((section, space.strip('/').removeprefix('**'), node))
+    spaces = {space for _, space, _ in places if space}
+    chosen = {namespace.strip('/')} & spaces or spaces
+    if len(chosen) > 1:
+        raise ValueError(
+            f'{path} has parameters of several suites: choose one with --namespace {" or ".join(sorted(spaces))}'
+        )
+    found: dict[str, dict[str, Any]] = {}
+    for section, space, node in places:
+        own: dict[str, Any] = {}
+        for key, value in _flatten(content[section][_PARAMETERS] or {}):
+            if key in own:
+                raise ValueError(f'{path} has {key} twice (for {section})')
+            own[key] = value
+        if not space or space in chosen:
+            found.setdefault(node, {}).update(own)
+    return found
 
 
 class RigOption(NamedTuple):

@@ -64,14 +64,16 @@ TRIAL_COLUMNS: dict[str, Any] = {
 STEP_COLUMNS = ('trial', 'wheel', 'steps', 'seconds', 'x', 'error_percent')
 
 
-def open_trial(path: Path, name: str, rig: Path | None = None, topic: str = JOINT_STATES.name) -> RecordedTrial:
+def open_trial(
+    path: Path, name: str, rig: Path | None = None, topic: str = JOINT_STATES.name, namespace: str = ''
+) -> RecordedTrial:
     """Analyze a recording, and read what was recorded about it.
 
     Raises:
         ValueError, OSError: as `dcdrw.trials.results.read_trial`.
 
     """
-    analysis, _ = read_trial(path, rig=rig, topic=topic)
+    analysis, _ = read_trial(path, rig=rig, topic=topic, namespace=namespace)
     bag = find_bag(path)
     folder = bag.path if bag.path.is_dir() else bag.path.parent
     errors = analysis.status.history
@@ -130,7 +132,11 @@ def _source(folder: Path) -> str:
         content = read_yaml(folder / PARAMETERS)
     except (OSError, ValueError):
         return MEASURED
-    return SIMULATED if isinstance(content, dict) and 'simulator' in content else MEASURED
+    return SIMULATED if isinstance(content, dict) and any(_is_simulator(name) for name in content) else MEASURED
+
+
+def _is_simulator(section: Any) -> bool:
+    return str(section).rpartition('/')[2] == 'simulator'
 
 
 def _about(about: dict[str, str]) -> dict[str, str]:

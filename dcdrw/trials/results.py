@@ -23,7 +23,11 @@ SAMPLES_HEADER = ('stamp_ns', 'theta1', 'omega1', 'theta2', 'omega2', 'phi', 'ph
 
 
 def read_trial(
-    path: Path, params: TrialParams | None = None, rig: Path | None = None, topic: str = JOINT_STATES.name
+    path: Path,
+    params: TrialParams | None = None,
+    rig: Path | None = None,
+    topic: str = JOINT_STATES.name,
+    namespace: str = '',
 ) -> tuple[Analysis, dict[str, Agreement]]:
     """Analyze the trial in a recording, and hold the result against what the nodes published then.
 
@@ -32,6 +36,7 @@ def read_trial(
         params: by default those that were recorded, or where there are none the suite's defaults.
         rig: a parameter file; what it names takes the place of these.
         topic: where the joint states are, in any namespace.
+        namespace: of the suite, where the recording has several.
 
     Raises:
         ValueError: no recording, no such topic, or no joint states that can be read.
@@ -39,11 +44,12 @@ def read_trial(
 
     """
     with Recording(path) as recording:
-        name, batches = _joint_states(recording, topic, rig)
+        name, batches = _joint_states(recording, topic, rig, namespace)
+        space = name.rpartition('/')[0]
         if params is None:
             params = TrialParams()
             if recording.parameters:
-                params = read_parameter_file(recording.parameters, params)
+                params = read_parameter_file(recording.parameters, params, space)
         if rig:
             params = read_parameter_file(rig, params)
         trial = analyze(batches, params)
@@ -52,18 +58,20 @@ def read_trial(
                 ' (front_joint and rear_joint in a rig file name them)' if trial.unreadable.startswith('joint') else ''
             )
             raise ValueError(f'{path}: {name}: {trial.unreadable}{mend}')
-        agreements = compare(recording, trial, name.rpartition('/')[0])
+        agreements = compare(recording, trial, space)
         return trial._replace(damage=tuple(recording.damage), notes=tuple(recording.notes)), agreements
 
 
-def _joint_states(recording: Recording, topic: str, rig: Path | None) -> tuple[str, Iterable[JointBatch]]:
+def _joint_states(
+    recording: Recording, topic: str, rig: Path | None, namespace: str
+) -> tuple[str, Iterable[JointBatch]]:
     """The topic's name, and what it holds.
 
     Where only poses of the wheels or sensors on legs were recorded, what tag_tracker or leg_tracker makes of them.
     """
-    legs, poses = leg_topics(recording), pose_topics(recording)
+    legs, poses = ([], []) if namespace else (leg_topics(recording), pose_topics(recording))
     if not (legs or poses) or topic != JOINT_STATES.name or find_topic(recording, JOINT_STATES):
-        name = recording.find(topic)
+        name = recording.find(topic, namespace=namespace)
         return name, _shown(recording.joints(name), recording.count(name))
     if poses:
         return f'{poses[0].rpartition("/")[0]}/{topic}', pose_batches(recording, rig)

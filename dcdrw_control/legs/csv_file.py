@@ -1,6 +1,5 @@
 """Readings of the sensors on the legs from a CSV file, as laboratories keep them."""
 
-import csv
 import math
 import re
 from collections import defaultdict
@@ -23,6 +22,7 @@ from dcdrw_control.legs.samples import (
 )
 from dcdrw_msgs_py.rig import FRONT
 from dcdrw_msgs_py.samples import SECOND
+from dcdrw_msgs_py.text_file import read_rows
 from dcdrw_msgs_py.topics import SIDES
 
 Floats = NDArray[np.float64]
@@ -86,8 +86,7 @@ def read_legs(path: Path, rate: float = math.nan) -> LegTable:
 
 
 def _read(path: Path) -> tuple[list[str], Floats]:
-    with path.open(newline='', encoding='utf-8') as file:
-        rows = [row for row in csv.reader(file) if row]
+    rows = [row for _, row in read_rows(path)]
     heads = [row for row in rows[:2] if not _is_number(row[-1])]
     if len(heads) == 2:
         names = [f'{sensor.removesuffix("_sensor")}_{axis}' for sensor, axis in zip(*heads, strict=False)]

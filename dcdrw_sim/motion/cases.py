@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from dcdrw_msgs_py.quantity import suggestion
 from dcdrw_msgs_py.rig import RigParams, WheelParams
+from dcdrw_msgs_py.text_file import read_text
 from dcdrw_sim.model.dynamics import State
 from dcdrw_sim.motion.ends import Strike
 from dcdrw_sim.motion.pair import Simulation
@@ -47,8 +48,9 @@ def read_cases(path: Path) -> tuple[list[Case], bool]:
         OSError: the file cannot be read.
 
     """
+    text = read_text(path)
     try:
-        content = json.loads(path.read_text(encoding='utf-8'))
+        content = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise ValueError(f'{path} is not JSON: {error}') from None
     entries = content if isinstance(content, list) else [content]

@@ -18,6 +18,10 @@ ENDS_EARLY = 0.98
 """A video that yields less than this share of the frames that it promises is truncated."""
 
 
+LARGEST_PICTURE = 2**26
+"""Pixels of a picture beyond which a video is taken to be damaged."""
+
+
 class VideoFile:
     """A video file, frame by frame; `frame_rate` [Hz], where it is a number, takes the place of the file's own stamps.
 
@@ -35,6 +39,9 @@ class VideoFile:
         self._capture = cv2.VideoCapture(str(path))
         if not self._capture.isOpened():
             raise ValueError(f'{path} is no video that OpenCV reads, or it is truncated')
+        width, height = (int(self._capture.get(key)) for key in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
+        if width * height > LARGEST_PICTURE:
+            raise ValueError(f'{path} claims pictures of {width} × {height} pixels, more than a camera takes')
         self.own_rate = float(self._capture.get(cv2.CAP_PROP_FPS))
         """Frames per second that the file tells; 0 where it does not."""
         self.count = max(int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT)), 0)
@@ -61,7 +68,10 @@ class VideoFile:
         if invented and math.isnan(self._given_rate):
             raise ValueError(f'{self._path} has no time stamps: set frame_rate to that of the camera')
         while True:
-            good, image = self._capture.read()
+            try:
+                good, image = self._capture.read()
+            except cv2.error:  # of any kind, for the content may be anything
+                good = False
             if not good:
                 self._capture.release()
                 return
@@ -71,7 +81,7 @@ class VideoFile:
             time -= first
             if math.isfinite(self._given_rate):
                 time = self.read / self._given_rate
-            elif time <= last:  # they stand still
+            elif not last < time < math.inf:  # they stand still
                 time = last + 1.0 / (self.own_rate or RAW_RATE)
             self.read += 1
             last = time

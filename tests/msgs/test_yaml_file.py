@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dcdrw_msgs_py.yaml_file import DEEPEST, LARGEST_FILE, parse_yaml, read_yaml, yaml_text
+from dcdrw_msgs_py.text_file import LARGEST_TEXT
+from dcdrw_msgs_py.yaml_file import DEEPEST, parse_yaml, read_yaml, yaml_text
 
 SCALARS = [
     *('1', '-7', '+3', '0x1F', '010', '08', '9223372036854775807', '9223372036854775808'),
@@ -63,12 +64,12 @@ def test_what_pyyaml_would_write_plainly_is_quoted_where_a_node_would_take_it_fo
     ('data', 'message'),
     [
         (b'a: [', 'is not YAML: while parsing'),
-        (b'\xff\xfe\xff', 'is not YAML'),
+        (b'\xff\xfe\xff', 'is no UTF-8 text'),
         (b'a: !!python/object/apply:os.system [ls]', 'is not YAML: could not determine a constructor'),
         (b'a: &x [1]\nb: *x', r'is not YAML: line 2 has the alias \*x: write its value there'),
         (b'[' * 100_000, 'is not YAML'),
         (b'- ' * (DEEPEST + 1) + b'a', f'nested more than {DEEPEST} levels deep'),
-        (b'a' * (LARGEST_FILE + 1), 'is larger than 16 MB: is it the right file'),
+        (b'a' * (LARGEST_TEXT + 1), 'is larger than 16 MB: is it the right file'),
     ],
 )
 def test_what_is_no_yaml_is_refused_in_one_line(data, message, tmp_path):

@@ -120,7 +120,7 @@ def test_rig_file_gives_the_joints_the_names_of_the_suite(bench, renamed, tmp_pa
     )
     joints = bench.hear(JOINT_STATES, '/rig_2/joint_states')
     process = replay(
-        bench, str(renamed), '--rig', str(tmp_path / 'rig.yaml'), '--namespace', 'rig_2', '--to', '1', '--rate', '4'
+        bench, str(renamed), '--rig', str(tmp_path / 'rig.yaml'), '--into', 'rig_2', '--to', '1', '--rate', '4'
     )
     assert finish(bench, process) == '100 joint states sent\n'
     assert joints[99].name == ['front_wheel', 'arm', 'rear_wheel']

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import yaml
 from mcap.reader import make_reader
+from rcl_interfaces.srv import GetParameters
 from rosbags.rosbag2 import Reader
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Bool
@@ -19,6 +20,7 @@ from std_srvs.srv import SetBool
 from dcdrw.recordings.recorder import Recorder
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.executables import RECORDED
+from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw_msgs_py.diagnosis import STATE, RecorderState, messages_of
 from dcdrw_msgs_py.messages import to_stamp
 from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, SYNCHRONIZED, Topic
@@ -190,6 +192,20 @@ def test_service_starts_and_stops_recordings(bench, tmp_path):
     assert about.keys() >= {'dcdrw_version', 'git_revision', 'machine', 'started'}
     for text in (about['parameters'], (tmp_path / 'one' / 'parameters.yaml').read_text()):
         assert yaml.safe_load(text)['phase_estimator']['ros__parameters']['hysteresis_deg'] == 2.5
+
+
+def test_parameters_recorded_in_a_namespace_take_effect_when_given_back(bench, tmp_path):
+    space = ('-r', '__ns:=/rig_2')
+    recorder = bench.start('recorder', '-p', f'folder:={tmp_path}/bag', *space, record=True)
+    estimator = bench.start('phase_estimator', *space, hysteresis_deg=2.5)
+    recorded = tmp_path / 'bag' / 'parameters.yaml'
+    bench.wait(recorded.exists, "the estimator's parameters")
+    assert bench.end(recorder) == bench.end(estimator) == 0
+    assert read_parameter_file(recorded, TrialParams()).phase.hysteresis_deg == 2.5
+    bench.start('phase_estimator', '--params-file', str(recorded), *space)
+    request = GetParameters.Request(names=['hysteresis_deg'])
+    answer = bench.call(GetParameters, '/rig_2/phase_estimator/get_parameters', request)
+    assert answer.values[0].double_value == 2.5
 
 
 def test_pictures_and_drawings_are_kept_only_when_asked_for():

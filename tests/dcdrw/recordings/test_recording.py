@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.rosbag2 import Reader, StoragePlugin
+from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.rosbag2.enums import CompressionMode
 
 from dcdrw.recordings.joint_batch import decode_joints
@@ -456,3 +457,18 @@ def test_topics_are_found_in_any_namespace_unless_several_fit(tmp_path):
             ValueError, match='no topic joint_states of sensor_msgs/msg/JointState; of this type it has: /rig/encoders'
         ):
             recording.find('joint_states')
+
+
+def test_two_suites_are_told_apart_by_their_namespace(tmp_path):
+    with BagWriter(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        for k, topic in enumerate(('/rig_1/joint_states', '/rig_2/joint_states', '/joint_states')):
+            connection = writer.add_connection(topic, 'sensor_msgs/msg/JointState', typestore=TYPES)
+            writer.write(connection, 10**18 + k, MESSAGES[k][1])
+    with Recording(tmp_path / 'bag') as recording:
+        with pytest.raises(ValueError, match='choose one with --namespace / or /rig_1 or /rig_2'):
+            recording.find('joint_states')
+        assert recording.find('joint_states', namespace='/') == '/joint_states'
+        for space in ('rig_2', '/rig_2', '/rig_2/'):
+            assert recording.find('joint_states', namespace=space) == '/rig_2/joint_states'
+        with pytest.raises(ValueError, match='no topic joint_states of sensor_msgs/msg/JointState in rig_3'):
+            recording.find('joint_states', namespace='rig_3')

@@ -1,0 +1,47 @@
+"""Text files and tables of strangers: read within bounds, and every trouble told with the file's name."""
+
+import csv
+from collections.abc import Iterator
+from io import StringIO
+from pathlib import Path
+
+LARGEST_TEXT = 16 * 2**20
+"""A larger text is none of ours [bytes]."""
+LARGEST_TABLE = 256 * 2**20
+"""A larger table is none of ours [bytes]."""
+
+
+def read_text(path: Path, largest: int = LARGEST_TEXT) -> str:
+    """The content of a text file in UTF-8.
+
+    Raises:
+        ValueError: too large, or not UTF-8; names the file.
+        OSError: the file cannot be read.
+
+    """
+    with Path(path).open('rb') as file:
+        data = file.read(largest + 1)
+    if len(data) > largest:
+        raise ValueError(f'{path} is larger than {largest // 2**20} MB: is it the right file?')
+    try:
+        return data.decode('utf-8-sig')
+    except UnicodeDecodeError as error:
+        line = data.count(b'\n', 0, error.start) + 1
+        raise ValueError(f'{path}, line {line}: byte 0x{data[error.start]:02x} is no UTF-8 text') from None
+
+
+def read_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """The rows of a CSV file that are not empty, each with the number of its last line.
+
+    Raises:
+        ValueError: not CSV in UTF-8; names the file and the line.
+        OSError: the file cannot be read.
+
+    """
+    reader = csv.reader(StringIO(read_text(path, LARGEST_TABLE), newline=''))
+    try:
+        for row in reader:
+            if row:
+                yield reader.line_num, row
+    except csv.Error as error:
+        raise ValueError(f'{path}, line {reader.line_num}: {error}') from None
