@@ -3,8 +3,11 @@
 import math
 
 from dcdrw_control.legs.phase import LegSample
-from dcdrw_msgs_py.samples import Turn
+from dcdrw_msgs_py.samples import SECOND, Turn
 
+FASTEST = 15.0
+"""A wheel turns no faster than this, for those that follow it to believe it: an early strike is caught up with within
+some 10 ms [rad/s]."""
 Side = int
 LEFT, RIGHT = 0, 1
 
@@ -23,12 +26,14 @@ class Half:
         self._seen = [0, 0]
         self._next: Side = LEFT
         self._ahead = math.nan
-        self._progress = 0.0
+        self._last_ns = 0
+        self._psi = -math.inf
 
-    def update(self, legs: tuple[LegSample | None, LegSample | None]) -> Turn | None:
+    def update(self, stamp_ns: int, legs: tuple[LegSample | None, LegSample | None]) -> Turn | None:
         """The wheel's rotation ψ and its rate from both legs, at one time; None while either leg is unknown.
 
         Args:
+            stamp_ns: the time.
             legs: left and right; None where its phase is unknown.
 
         """
@@ -39,14 +44,15 @@ class Half:
                 self._next = 1 - side
                 other = legs[self._next]
                 self._ahead = other.remaining if other else math.nan
-                self._progress = 0.0
         leg = legs[self._next]
         if None in legs or leg is None:
             self._ahead = math.nan  # how far it has come since is unknown: with the next strike it is known again
         if leg is None or math.isnan(self._ahead):
             return None
-        progress = 1.0 - leg.remaining / self._ahead
-        rate = leg.rate / self._ahead if progress >= self._progress else 0.0
-        self._progress = max(progress, self._progress)
         pitch = 2.0 * self._alpha
-        return Turn(self._alpha + pitch * (self.steps - 1 + self._progress), pitch * rate)
+        goal = psi = self._alpha + pitch * (self.steps - leg.remaining / self._ahead)
+        if math.isfinite(self._psi) and stamp_ns >= self._last_ns:  # else the source has started anew
+            psi = min(max(goal, self._psi), self._psi + FASTEST * (stamp_ns - self._last_ns) / SECOND)
+        rate = pitch * leg.rate / self._ahead if goal >= self._psi else 0.0
+        self._last_ns, self._psi = stamp_ns, psi
+        return Turn(psi, rate)

@@ -181,7 +181,8 @@ class LegTracker:
             leg: Turn(math.tau * sample.strides, math.tau * sample.rate) for leg, sample in samples.items() if sample
         }
         wheels = {
-            joint: half.update((samples[left], samples[right])) for joint, (half, left, right) in self._halves.items()
+            joint: half.update(stamp_ns, (samples[left], samples[right]))
+            for joint, (half, left, right) in self._halves.items()
         }
         return LegUpdate(stamp_ns, turns, {joint: turn for joint, turn in wheels.items() if turn})
 

@@ -1,13 +1,18 @@
 import math
 
+import numpy as np
 import pytest
+from legs import person
 
 from dcdrw.cli import main
-from dcdrw.recordings.leg_recording import leg_readings, leg_topics
+from dcdrw.recordings.leg_recording import leg_readings, leg_topics, wheel_batches
 from dcdrw.recordings.recording import Recording
+from dcdrw.suite.parameter_file import TrialParams
+from dcdrw.trials.analysis import analyze
 from dcdrw.trials.results import read_trial
 from dcdrw_control.legs.params import HIPS
-from dcdrw_control.legs.samples import LEGS, ContactReading, ImuReading, WrenchReading
+from dcdrw_control.legs.samples import LEGS, ContactReading, ImuReading, Leg, WrenchReading
+from dcdrw_control.legs.walk import follow
 from tests.dcdrw.recordings.legs import PERIOD, RATE, write_walk
 
 
@@ -56,3 +61,19 @@ def test_the_command_tells_of_each_leg_of_a_recording(tmp_path, capsys):
     assert float(left) != float(right)
     assert main(['legs', str(walk), '--out', str(tmp_path / 'out')]) == 2
     assert 'exists already' in capsys.readouterr().err
+
+
+def test_a_recorded_person_before_a_robot_is_followed_by_estimator_and_monitor_through_the_turn():
+    """The robot walks as the person does, a quarter of a stride ahead of it."""
+    ahead_ns = 270_000_000
+    front = [reading._replace(stamp_ns=reading.stamp_ns + 10**9) for reading in person()]
+    rear = [r._replace(stamp_ns=r.stamp_ns - ahead_ns, leg=Leg('rear', r.leg.side)) for r in front]
+    readings = sorted(front + rear, key=lambda reading: reading.stamp_ns)
+    trial = analyze(wheel_batches(follow(readings).updates), TrialParams())
+    assert trial.estimator.restarts == 0
+    assert trial.estimator.refused['outlier'] == 0
+    assert abs(trial.estimator.front_steps - trial.estimator.rear_steps) <= 1
+    walking = (trial.motion.stamp_ns > 4 * 10**9) & (trial.motion.stamp_ns < 33 * 10**9)
+    error = trial.motion.error_percent[walking]
+    assert np.sqrt(np.mean(error**2)) < 6.0
+    assert np.mean(np.abs(error) < 6.0) > 0.9
