@@ -14,6 +14,7 @@ from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.lone_wheels import LoneWheels
 from dcdrw.suite.parameter_file import TrialParams
 from dcdrw_msgs_py.diagnosis import PairState
+from dcdrw_msgs_py.rig import FRONT
 from dcdrw_msgs_py.rolling import phi_pitch
 from dcdrw_msgs_py.samples import SECOND, CouplerSample, Footfall, JointSample, PhaseSample, Turn, run_of
 from dcdrw_tracker.gait.cadence import GAP, CadenceStatus
@@ -116,6 +117,18 @@ class Analysis(NamedTuple):
     def pitch(self) -> float:
         """The angle φ of a whole step, α1 + α2 [rad]."""
         return phi_pitch(self.params.sync.front, self.params.sync.rear)
+
+    def strike_errors(self) -> Iterator[tuple[Footfall, float, bool]]:
+        """Strikes of the front wheel in the part that is judged, with the error there [%], and whether each was seen.
+
+        A strike between two samples with others missing in between is not seen: its time is a guess.
+        """
+        motion = self.motion
+        begins, ends = motion.stamp_ns[motion.gaps - 1], motion.stamp_ns[motion.gaps]
+        falls = [fall for fall in self.judged_footfalls if fall.wheel == FRONT]
+        errors = self.status.history
+        for fall, error in zip(falls[-len(errors) :] if errors else [], errors[-len(falls) :], strict=False):
+            yield fall, error, not ((begins < fall.stamp_ns) & (fall.stamp_ns < ends)).any()
 
     @property
     def state(self) -> PairState:

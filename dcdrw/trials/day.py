@@ -13,7 +13,7 @@ from dcdrw.trials.analysis import Analysis
 from dcdrw.trials.decay import Decay, fit_decay
 from dcdrw.trials.results import read_trial
 from dcdrw.trials.summary import Summary, final_band, summarize
-from dcdrw_msgs_py.rig import FRONT, RigParams
+from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.topics import JOINT_STATES
 from dcdrw_msgs_py.yaml_file import read_yaml
@@ -57,7 +57,12 @@ TRIAL_COLUMNS: dict[str, Any] = {
     'front_steps': lambda trial: trial.summary.front_steps,
     'slips': lambda trial: trial.summary.slips,
     'seconds': lambda trial: trial.summary.duration_s,
-    'samples_lost': lambda trial: trial.analysis.status.cadence.lost,
+    'complete': lambda trial: trial.summary.complete,
+    'judged_from_s': lambda trial: trial.summary.judged_from_s,
+    'samples_lost': lambda trial: trial.summary.samples.lost,
+    'samples_refused': lambda trial: sum(trial.summary.samples.refused.values()),
+    'restarts': lambda trial: trial.analysis.status.restarts,
+    'remarks': lambda trial: ' '.join(remark.text for remark in trial.summary.remarks),
     'started': lambda trial: trial.about.get('started', ''),
     'note': lambda trial: trial.about.get('note', ''),
 }
@@ -100,17 +105,16 @@ def _cell(value: Any) -> Any:
 
 
 def step_rows(trial: RecordedTrial) -> Iterable[tuple[Any, ...]]:
-    """Every footfall, with the error at those of the front wheel."""
-    errors = iter(trial.analysis.status.history)
+    """Every footfall of the part that is judged, with the error at those of the front wheel that were seen."""
+    errors = {fall: error for fall, error, seen in trial.analysis.strike_errors() if seen}
     for fall in trial.analysis.judged_footfalls:
-        error = next(errors, math.nan) if fall.wheel == FRONT else math.nan
         yield (
             trial.name,
             fall.wheel,
             fall.steps,
             (fall.stamp_ns - int(trial.analysis.motion.stamp_ns[0])) / SECOND,
             fall.x,
-            error,
+            errors.get(fall, math.nan),
         )
 
 

@@ -5,37 +5,65 @@ import html
 import math
 from collections.abc import Mapping, Sequence
 from io import StringIO
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
-import numpy as np
-
 from dcdrw.trials.day import RecordedTrial
-from dcdrw.trials.figure import draw_trial
-from dcdrw.trials.summary import final_band
+from dcdrw.trials.figure import trial_figure
+from dcdrw.trials.report_figures import colour, dashes, draw_decay, draw_steps, draw_times
+from dcdrw.trials.summary import final_band, verdict
 from dcdrw_msgs_py.diagnosis import PairState
-from dcdrw_sim.figures.style import BAND, BLACK, BLUE, GREEN, ORANGE, PINK, SKY, VERMILION
-
-_COLOURS = BLUE, VERMILION, GREEN, PINK, SKY, ORANGE, BLACK
 
 _STYLE = """
-:root { color-scheme: light dark; --line: #d0d4da; --soft: #f3f5f7; --ok: #006b4a; --bad: #a33c00; }
-@media (prefers-color-scheme: dark) { :root { --line: #444b55; --soft: #22262c; --ok: #3fcf9f; --bad: #ff9a5c; } }
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 70rem; margin: 2rem auto; padding: 0 1rem; }
+:root { color-scheme: light; --line: #d0d4da; --soft: #f3f5f7; --ok: #006b4a; --bad: #a33c00; --text: #16191d; }
+@media screen and (prefers-color-scheme: dark) {
+  :root { color-scheme: dark; --line: #444b55; --soft: #22262c; --ok: #3fcf9f; --bad: #ff9a5c; --text: #e9ecef; }
+  body { background: #14171b; }
+}
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 78rem; margin: 2rem auto; padding: 0 1rem; color: var(--text); }
 h2 { margin-top: 3rem; border-bottom: 1px solid var(--line); }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .92rem; width: 100%; }
+th, td { padding: .3rem .45rem; border-bottom: 1px solid var(--line); text-align: right; vertical-align: top; }
+th { font-weight: 600; line-height: 1.25; vertical-align: bottom; } th small { font-weight: 400; }
+td { white-space: nowrap; }
+th.text, td.text { text-align: left; white-space: normal; }
+td.name { min-width: 11em; max-width: 18em; overflow-wrap: break-word; }
 .wide { overflow-x: auto; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { padding: .3rem .5rem; border-bottom: 1px solid var(--line); text-align: right; white-space: nowrap; }
-th:first-child, td:first-child, .text { text-align: left; }
-.ok { color: var(--ok); font-weight: 600; } .bad { color: var(--bad); font-weight: 600; } .none { opacity: .7; }
-figure { margin: 1rem 0; background: white; border-radius: .4rem; padding: .4rem; }
+.ok { color: var(--ok); font-weight: 600; } .bad { color: var(--bad); font-weight: 600; } .none { opacity: .75; }
+.verdict { font-size: 1.15rem; } .remarks { margin-top: .3rem; }
+figure { margin: 1rem 0; background: white; border-radius: .4rem; padding: .4rem; break-inside: avoid; }
 figure svg { display: block; width: 100%; height: auto; }
 figcaption { color: #333; font-size: .9rem; padding: 0 .6rem .4rem; }
+fieldset { display: flex; flex-wrap: wrap; gap: .2rem 1.2rem; border: 1px solid var(--line); border-radius: .4rem; }
+fieldset label { white-space: nowrap; } fieldset i { display: inline-block; width: 1.6rem; height: 0; margin: 0 .3rem;
+  vertical-align: middle; border-top: 3px solid; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: .1rem 1rem; background: var(--soft);
   padding: .6rem 1rem; border-radius: .4rem; }
 dt { font-weight: 600; } dd { margin: 0; overflow-wrap: anywhere; }
-@media print { h2 { break-before: page; } }
+@media print {
+  @page { margin: 12mm; }
+  body { font-size: 10pt; max-width: none; margin: 0; padding: 0; }
+  table { font-size: 7pt; } th, td { padding: .15rem .2rem; }
+  figure { margin: .4rem 0; padding: 0; } figure svg { width: auto; max-width: 100%; max-height: 118mm; margin: auto; }
+  .verdict { font-size: 11pt; }
+  h2 { break-before: page; } .wide { overflow: visible; } .downloads, fieldset button { display: none; }
+  a { color: inherit; text-decoration: none; }
+}
+"""
+_SCRIPT = """
+const boxes = [...document.querySelectorAll('#choice input')];
+function show() {
+  for (const box of boxes) {
+    for (const kind of ['steps', 'time']) {
+      const curve = document.getElementById(kind + box.value);
+      if (curve) curve.style.display = box.checked ? '' : 'none';
+    }
+  }
+}
+for (const button of document.querySelectorAll('#choice button')) {
+  button.addEventListener('click', () => { for (const box of boxes) box.checked = button.value === 'all'; show(); });
+}
+document.getElementById('choice')?.addEventListener('change', show);
+show();
 """
 
 _PAGE = """<!doctype html>
@@ -50,9 +78,12 @@ _PAGE = """<!doctype html>
 <h1>{title}</h1>
 {overview}
 {trials}
+<script>{script}</script>
 </body>
 </html>
 """
+GAPS_LISTED = 12
+"""Of each trial, the longest."""
 
 
 def page(title: str, trials: Sequence[RecordedTrial], tables: Mapping[str, str]) -> str:
@@ -71,54 +102,69 @@ def page(title: str, trials: Sequence[RecordedTrial], tables: Mapping[str, str])
         f'<a download="{name}" href="data:text/csv;base64,{base64.b64encode(text.encode()).decode()}">{name}</a>'
         for name, text in tables.items()
     )
-    overview = f'<div class="wide">{_table(trials)}</div>\n<p>{downloads}</p>\n'
-    if any(trial.analysis.ran for trial in trials):
-        overview += _figure(
-            _overlay([trial for trial in trials if trial.analysis.ran]),
-            'Phase difference at the strikes of the front wheel, dashed where it was '
-            'measured. 50 % of a step is 25 % of a stride.',
-        )
+    ran = [(number, trial) for number, trial in enumerate(trials) if trial.analysis.ran]
     return _PAGE.format(
         title=html.escape(title),
         style=_STYLE,
-        overview=overview,
+        script=_SCRIPT,
+        overview=f'<div class="wide">{_table(trials)}</div>\n<p class="downloads">{downloads}</p>\n'
+        + (_overlays(ran) if ran else ''),
         trials='\n'.join(_section(number, trial) for number, trial in enumerate(trials)),
     )
 
 
+_HEADS = (
+    ('trial', ''),
+    ('verdict', ''),
+    ('from', '% of a step'),
+    ('in step after', 'steps'),
+    ('final band', '% of a step'),
+    ('a step leaves', '% of the error'),
+    ('tends to', '% of a step'),
+    ('k', 'N/m'),
+    ('b', 'N·s/m'),
+    ('slope', '°'),
+    ('samples missing', ''),
+    ('refused', ''),
+    ('began anew', 'times'),
+    ('source', ''),
+)
+_CLASSES = {0: ' class="text name"', 1: ' class="text"'}
+"""Of the columns that are no figures."""
+_UNKNOWN = '–'
+"""A column that holds nothing else is left out."""
+
+
 def _table(trials: Sequence[RecordedTrial]) -> str:
-    heads = (
-        'trial',
-        'source',
-        'from',
-        'in step after',
-        'final band',
-        'a step leaves',
-        'tends to',
-        'k',
-        'b',
-        'slope',
-        'verdict',
-    )
-    units = ('', '', '% of a step', 'steps', '% of a step', '% of the error', '% of a step', 'N/m', 'N·s/m', '°', '')
-    rows = [''.join(f'<th>{head}<br><small>{unit}</small></th>' for head, unit in zip(heads, units, strict=True))]
+    rows = []
     for number, trial in enumerate(trials):
-        rig, summary = trial.rig, trial.summary
+        rig, summary, samples = trial.rig, trial.summary, trial.summary.samples
         low, high = final_band(trial.analysis)
         steps = summary.steps_to_synchronization
+        ran = trial.analysis.ran
         cells = (
             f'<a href="#trial{number}">{html.escape(trial.name)}</a>',
-            trial.source,
-            _number(100 * trial.analysis.status.initial_phase, 1),
-            '–' if steps is None else str(steps),
-            f'{_number(50 + low, 1)} to {_number(50 + high, 1)}',
+            _verdict(trial),
+            _number(100 * trial.analysis.status.initial_phase, 1) if ran else _UNKNOWN,
+            _UNKNOWN if steps is None else str(steps),
+            f'{_number(50 + low, 1)} to {_number(50 + high, 1)}' if ran else _UNKNOWN,
             _number(100 * trial.decay.ratio, 1),
             _number(50 + trial.decay.limit, 1),
             *map(_short, (rig.k, rig.b, math.degrees(rig.slope))),
-            _verdict(trial),
+            str(samples.lost),
+            str(sum(samples.refused.values())),
+            str(trial.analysis.status.restarts),
+            trial.source,
         )
-        rows.append(''.join(f'<td>{cell}</td>' for cell in cells))
-    return '<table>' + '\n'.join(f'<tr>{row}</tr>' for row in rows) + '</table>'
+        rows.append(cells)
+    known = [column for column in range(len(_HEADS)) if any(row[column] != _UNKNOWN for row in rows)]
+    heads = ''.join(
+        f'<th{_CLASSES.get(column, "")}>{head}<br><small>{unit}</small></th>'
+        for column, (head, unit) in enumerate(_HEADS)
+        if column in known
+    )
+    lines = (''.join(f'<td{_CLASSES.get(column, "")}>{row[column]}</td>' for column in known) for row in rows)
+    return f'<table><tr>{heads}</tr>\n' + '\n'.join(f'<tr>{line}</tr>' for line in lines) + '</table>'
 
 
 _VERDICTS = {
@@ -135,94 +181,76 @@ _VERDICTS = {
 
 def _verdict(trial: RecordedTrial) -> str:
     words, kind = _VERDICTS[trial.summary.state]
-    return f'<span class="{kind}">{words}</span>'
+    less = '' if trial.summary.complete or not trial.analysis.ran else ', of a part'
+    return f'<span class="{kind}">{words}{less}</span>'
+
+
+def _overlays(trials: Sequence[tuple[int, RecordedTrial]]) -> str:
+    """All trials in one picture each of steps and of time, and the choice of those to be seen."""
+    choice = ''.join(
+        f'<label><input type="checkbox" checked value="{number}">'
+        f'<i style="color:{colour(number)};border-top-style:{_BORDERS[dashes(trial)]}"></i>{html.escape(trial.name)}'
+        '</label>'
+        for number, trial in trials
+    )
+    return (
+        f'<fieldset id="choice"><legend>shown</legend>{choice}'
+        '<button type="button" value="all">all</button><button type="button" value="none">none</button></fieldset>\n'
+        + _figure(
+            _svg(draw_steps(trials)),
+            'Phase difference at the strikes of the front wheel, dashed where it was measured. 50 % of a step is '
+            '25 % of a stride.',
+        )
+        + _figure(_svg(draw_times(trials)), 'Phase difference against time, from where the wheels were let go.')
+    )
+
+
+_BORDERS = {'-': 'solid', '--': 'dashed'}
 
 
 def _section(number: int, trial: RecordedTrial) -> str:
+    said = (*(remark.text for remark in trial.summary.remarks), *trial.analysis.damage, *_gaps(trial))
     about = ''.join(
         f'<dt>{html.escape(name.replace("_", " "))}</dt><dd>{html.escape(value)}</dd>'
         for name, value in trial.about.items()
     )
-    text = f'<h2 id="trial{number}">{html.escape(trial.name)}</h2>\n<p>{html.escape(trial.summary.sentence)}</p>\n'
-    text += f'<dl>{about}</dl>\n' if about else ''
-    if not trial.analysis.ran:
-        return text
-    return (
-        text
-        + _figure(_picture(trial), 'Stance angles, phase difference with its band, footfalls and coupler force.')
-        + _figure(_decay(trial), 'Error at each strike of the front wheel, and the geometric decay fitted to it.')
+    text = f'<h2 id="trial{number}">{html.escape(trial.name)}</h2>\n'
+    text += f'<p class="verdict">{_verdict(trial)}. {html.escape(verdict(trial.analysis))}</p>\n'
+    if said:
+        text += f'<ul class="remarks">{"".join(f"<li>{html.escape(one)}</li>" for one in said)}</ul>\n'
+    if trial.analysis.ran:
+        text += _figure(_svg(trial_figure(trial.analysis, '')), _CAPTION)
+        if trial.analysis.status.history:
+            text += _figure(_svg(draw_decay(trial)), 'Error at each strike of the front wheel, and the decay of it.')
+    return text + (f'<dl>{about}</dl>\n' if about else '')
+
+
+_CAPTION = 'Stance angles, phase difference with its band, footfalls and, where it is known, the coupler force.'
+
+
+def _gaps(trial: RecordedTrial) -> list[str]:
+    """A line that lists the gaps."""
+    motion = trial.analysis.motion
+    seconds = motion.seconds
+    gaps = sorted(
+        ((float(seconds[row] - seconds[row - 1]), float(seconds[row - 1])) for row in motion.gaps), reverse=True
     )
+    if not gaps:
+        return []
+    listed = ', '.join(f'{length:.2g} s at {begin:.1f} s' for length, begin in gaps[:GAPS_LISTED])
+    more = f', and {len(gaps) - GAPS_LISTED} shorter ones' if len(gaps) > GAPS_LISTED else ''
+    return [f'Gaps, the longest first: {listed}{more}.']
 
 
 def _figure(svg: str, caption: str) -> str:
     return f'<figure>{svg}<figcaption>{caption}</figcaption></figure>\n'
 
 
-def _picture(trial: RecordedTrial) -> str:
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / 'trial.svg'
-        draw_trial(trial.analysis, '', path)
-        return _inline(path.read_text(encoding='utf-8'))
-
-
-def _overlay(trials: Sequence[RecordedTrial]) -> str:
-    figure, axes = _axes()
-    band = max(trial.analysis.params.sync.band_percent for trial in trials)
-    axes.axhspan(50 - band, 50 + band, color=BAND, alpha=0.18, linewidth=0, label=f'±{band:g} % of 50 %')
-    for number, trial in enumerate(trials):
-        phases = 50.0 + np.array(trial.analysis.status.history)
-        axes.plot(
-            np.arange(1, len(phases) + 1),
-            phases,
-            linestyle='-' if trial.source == 'simulated' else '--',
-            marker='.',
-            markersize=5,
-            linewidth=1.2,
-            color=_COLOURS[number % len(_COLOURS)],
-            label=trial.name,
-        )
-    axes.set(xlabel='steps of the front wheel', ylabel='phase [% of a step]')
-    axes.legend(loc='center left', bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
-    return _svg(figure)
-
-
-def _decay(trial: RecordedTrial) -> str:
-    figure, axes = _axes()
-    band, errors = trial.analysis.params.sync.band_percent, np.array(trial.analysis.status.history)
-    steps = np.arange(1, len(errors) + 1)
-    axes.axhspan(-band, band, color=BAND, alpha=0.18, linewidth=0, label=f'±{band:g} %')
-    axes.axhline(0.0, color='0.85', linewidth=0.8, zorder=0)
-    axes.plot(steps, errors, 'o', color=_COLOURS[0], markersize=4, label='error')
-    if not math.isnan(trial.decay.ratio):
-        fine = np.linspace(0.0, max(len(errors) - 1, 1), 400)
-        axes.plot(
-            fine + 1,
-            trial.decay(fine),
-            color=_COLOURS[1],
-            linewidth=1.2,
-            label=f'{trial.decay.limit:+.1f} % {trial.decay.start:+.1f} % · {trial.decay.ratio:.3f}ᵏ',
-        )
-    axes.set(xlabel='steps of the front wheel', ylabel='error [% of a step]')
-    axes.legend(loc='center left', bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
-    return _svg(figure)
-
-
-def _axes() -> tuple[Any, Any]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 3.6), layout='constrained')
-    axes = figure.subplots()
-    axes.spines[['top', 'right']].set_visible(False)
-    axes.margins(x=0.01)
-    axes.locator_params(axis='x', integer=True)
-    return figure, axes
-
-
 def _svg(figure: Any) -> str:
     from matplotlib import rc_context
 
     file = StringIO()
-    with rc_context({'svg.fonttype': 'path'}):
+    with rc_context({'svg.fonttype': 'path', 'svg.hashsalt': 'dcdrw'}):
         figure.savefig(file, format='svg')
     return _inline(file.getvalue())
 
@@ -232,8 +260,8 @@ def _inline(svg: str) -> str:
 
 
 def _number(value: float, digits: int) -> str:
-    return '–' if math.isnan(value) else f'{value:.{digits}f}'
+    return _UNKNOWN if math.isnan(value) else f'{value:.{digits}f}'
 
 
 def _short(value: float) -> str:
-    return '–' if math.isnan(value) else f'{value:.4g}'
+    return _UNKNOWN if math.isnan(value) else f'{value:.4g}'

@@ -14,6 +14,7 @@ from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatorParams
 from tests.bags import joint_state, write_bag
+from tests.chromium import Chromium
 
 pytestmark = pytest.mark.processes
 
@@ -21,11 +22,12 @@ RATE = 100
 SECONDS = 12.0
 
 
-def measured_bag(folder, phase, names=('front_wheel', 'rear_wheel')):
+def measured_bag(folder, phase, names=('front_wheel', 'rear_wheel'), gap=(0.0, 0.0)):
     """A bag as a rig's own tracker fills it: no coupler, no parameters."""
     rig, state = SimulatorParams(initial_phase_percent=100.0 * phase).start(RigParams())
     motion = run(rig, state, SECONDS, 1000)
     times = np.arange(0.0, SECONDS, 1.0 / RATE)
+    times = times[~((times > gap[0]) & (times < gap[1]))]
     trajectory = motion.at(times)
     stamps = 10**18 + (times * 1e9).astype(int)
     return write_bag(
@@ -75,7 +77,7 @@ def test_page_is_self_contained_and_tells_each_trial(report):
     words = ' '.join(page.words)
     assert 'A <day>' in words
     assert 'first: "with" new springs' in words  # the operator's note
-    assert text.count('<svg') == 5  # the overlay, and two for each trial
+    assert text.count('<svg') == 6  # the overlays by steps and by time, and two for each trial
     assert {'out', 'bag'} <= set(page.words)
 
 
@@ -97,6 +99,58 @@ def test_tables_hold_every_number(report):
     assert all(step['error_percent'] for step in steps)
     samples = rows(report, 'samples.csv')
     assert sum(sample['trial'] == 'bag' for sample in samples) == pytest.approx(SECONDS * RATE, abs=2)
+
+
+@pytest.fixture(scope='module')
+def chromium(tmp_path_factory):
+    browser = Chromium(tmp_path_factory.mktemp('chromium'))
+    yield browser
+    browser.close()
+
+
+def test_verdicts_are_whole_at_1280_pixels_and_trials_are_laid_over_one_another_at_will(report, chromium):
+    tab = chromium.tab(f'file://{report}', 1280, 900)
+    assert tab.value('document.documentElement.scrollWidth') <= 1280
+    assert tab.value("document.querySelector('.wide').scrollWidth <= document.querySelector('.wide').clientWidth")
+    assert tab.value("[...document.querySelectorAll('th')].slice(0, 2).map(cell => cell.innerText.trim()).join()") == (
+        'trial,verdict'
+    )
+    shown = "['steps0', 'time0', 'steps1', 'time1'].map(id => +(document.getElementById(id).style.display !== 'none'))"
+    assert tab.value(f'{shown}.join()') == '1,1,1,1'
+    tab.value("document.querySelector('#choice [value=none]').click()")
+    assert tab.value(f'{shown}.join()') == '0,0,0,0'
+    tab.value('document.querySelector(\'#choice input[value="1"]\').click()')
+    assert tab.value(f'{shown}.join()') == '0,0,1,1'
+    assert tab.complaints == []
+
+
+def test_what_was_not_run_is_listed_as_such_and_not_drawn(tmp_path, capsys):
+    stamps = [10**18 + i * 10**7 for i in range(300)]
+    names = ('front_wheel', 'rear_wheel')
+    held = write_bag(
+        tmp_path / 'held', [(stamp, joint_state(stamp, names, (-0.26, 0.1), (0.0, 0.0))) for stamp in stamps]
+    )
+    path = tmp_path / 'r.html'
+    assert main(['report', str(held), '--out', str(path)]) == 1
+    assert 'Not run: the wheels were held' in capsys.readouterr().out
+    text = path.read_text()
+    assert 'not run: held' in text
+    assert '<svg' not in text
+    (trial,) = rows(path, 'trials.csv')
+    assert (trial['state'], trial['synchronized'], trial['complete']) == ('held', '', 'False')
+    assert main(['report', str(held), str(measured_bag(tmp_path / 'bag', 0.3)), '--out', str(tmp_path / 's.html')]) == 1
+    assert (tmp_path / 's.html').read_text().count('<svg') == 4
+
+
+def test_each_trial_tells_its_gaps(tmp_path):
+    bag = measured_bag(tmp_path / 'bag', 0.3, gap=(4.0, 4.5))
+    path = tmp_path / 'r.html'
+    assert main(['report', str(bag), '--out', str(path)]) == 0
+    (trial,) = rows(path, 'trials.csv')
+    assert int(trial['samples_lost']) == 49
+    words = ' '.join(Page(path.read_text()).words)
+    assert 'By the stamps, 49 of 1200 samples are missing' in words
+    assert 'Gaps, the longest first: 0.5 s at 4.0 s.' in words
 
 
 def test_nothing_is_overwritten(report, live_trial, capsys):

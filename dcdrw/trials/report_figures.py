@@ -1,0 +1,107 @@
+"""The figures of a report: trials over one another, and how the error of each dies out."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from dcdrw.trials.analysis import Floats
+from dcdrw.trials.day import SIMULATED, RecordedTrial
+from dcdrw_sim.figures.style import BAND, BLACK, BLUE, GREEN, ORANGE, PINK, SKY, VERMILION, new_figure
+
+_COLOURS = BLUE, VERMILION, GREEN, PINK, SKY, ORANGE, BLACK
+MOST_POINTS = 1500
+"""Of a curve: more than a page shows."""
+
+
+def colour(number: int) -> str:
+    """The colour of a trial in every figure."""
+    return _COLOURS[number % len(_COLOURS)]
+
+
+def dashes(trial: RecordedTrial) -> str:
+    """The line of a trial: dashed where it was measured."""
+    return '-' if trial.source == SIMULATED else '--'
+
+
+def draw_steps(trials: Sequence[tuple[int, RecordedTrial]]) -> Any:
+    """Phase differences at the strikes of the front wheel; the curve of trial n has the id `steps` n."""
+    figure, axes = _axes()
+    _shade_band(axes, max(trial.analysis.params.sync.band_percent for _, trial in trials))
+    for number, trial in trials:
+        errors = _seen_errors(trial)
+        axes.plot(
+            np.arange(1, len(errors) + 1),
+            50.0 + errors,
+            linestyle=dashes(trial),
+            marker='.',
+            markersize=5,
+            linewidth=1.2,
+            color=colour(number),
+            gid=f'steps{number}',
+        )
+    axes.set(xlabel='steps of the front wheel', ylabel='phase [% of a step]')
+    return figure
+
+
+def draw_times(trials: Sequence[tuple[int, RecordedTrial]]) -> Any:
+    """Phase differences against time; the curve of trial n has the id `time` n."""
+    figure, axes = _axes()
+    _shade_band(axes, max(trial.analysis.params.sync.band_percent for _, trial in trials))
+    for number, trial in trials:
+        axes.plot(*_thinned(trial), linestyle=dashes(trial), linewidth=1.2, color=colour(number), gid=f'time{number}')
+    axes.set(xlabel='time [s]', ylabel='phase [% of a step]')
+    return figure
+
+
+def draw_decay(trial: RecordedTrial) -> Any:
+    """The error at each strike of the front wheel, and the geometric decay fitted to it."""
+    figure, axes = _axes()
+    band, errors = trial.analysis.params.sync.band_percent, _seen_errors(trial)
+    steps = np.arange(1, len(errors) + 1)
+    axes.axhspan(-band, band, color=BAND, alpha=0.18, linewidth=0, label=f'±{band:g} %')
+    axes.axhline(0.0, color='0.85', linewidth=0.8, zorder=0)
+    axes.plot(steps, errors, 'o', color=BLUE, markersize=4, label='error')
+    if not math.isnan(trial.decay.ratio):
+        fine = np.linspace(0.0, max(len(errors) - 1, 1), 400)
+        axes.plot(
+            fine + 1,
+            trial.decay(fine),
+            color=VERMILION,
+            linewidth=1.2,
+            label=f'{trial.decay.limit:+.1f} % {trial.decay.start:+.1f} % · {trial.decay.ratio:.3f}ᵏ',
+        )
+    axes.set(xlabel='steps of the front wheel', ylabel='error [% of a step]')
+    axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False, borderaxespad=0.1)
+    return figure
+
+
+def _shade_band(axes: Any, band: float) -> None:
+    axes.axhspan(50 - band, 50 + band, color=BAND, alpha=0.18, linewidth=0, label=f'±{band:g} % of 50 %')
+    axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), frameon=False, borderaxespad=0.1)
+
+
+def _seen_errors(trial: RecordedTrial) -> Floats:
+    """The error at each strike of the front wheel [%]; NaN at those that fell into a gap."""
+    return np.array([error if seen else math.nan for _, error, seen in trial.analysis.strike_errors()])
+
+
+def _thinned(trial: RecordedTrial) -> tuple[Floats, Floats]:
+    """Time [s] and phase [% of a step] of as many samples as a page shows, cut at gaps and where the phase wraps."""
+    motion = trial.analysis.motion.rows(slice(trial.analysis.judged, None))
+    phase = 100.0 * motion.phi / trial.analysis.pitch
+    cuts = np.union1d(motion.gaps, np.flatnonzero(np.abs(np.diff(phase)) > 50.0) + 1)
+    every = max(len(phase) // MOST_POINTS, 1)
+    kept = np.union1d(np.arange(0, len(phase), every), [*cuts, *(cuts - 1)]).astype(int)
+    places = np.searchsorted(kept, cuts)
+    return np.insert(motion.seconds[kept], places, math.nan), np.insert(phase[kept], places, math.nan)
+
+
+def _axes() -> tuple[Any, Any]:
+    figure = new_figure(10, 3.6)
+    axes = figure.subplots()
+    axes.spines[['top', 'right']].set_visible(False)
+    axes.margins(x=0.01)
+    axes.locator_params(axis='x', integer=True)
+    return figure, axes
