@@ -52,6 +52,9 @@ examples:
   dcdrw track trial.mp4 --camera camera.yaml --rig calibrated.yaml --out trials/first
   dcdrw simulate case.json --strikes strikes.json --trajectory motion.csv --rate 200
 
+completion in bash and zsh, with argcomplete installed:
+  eval "$(register-python-argcomplete dcdrw)"
+
 nodes, each run by `ros2 run dcdrw NAME`:
   """ + ', '.join(name for name in EXECUTABLES if name != 'dcdrw')
 

@@ -59,6 +59,8 @@ class CommandLine:
 
     def run(self, arguments: Sequence[str]) -> int:
         """Run the command that these arguments name; returns the exit status."""
+        if '_ARGCOMPLETE' in os.environ:  # the shell asks what could be typed next
+            self._complete(os.environ['COMP_LINE'].split())
         chosen = next((argument for argument in arguments if not argument.startswith('-')), None)
         if chosen and chosen not in self.commands:
             mend = _suggestion(chosen, self.commands) or '; dcdrw --help lists them'
@@ -89,6 +91,15 @@ class CommandLine:
         except (ValueError, OSError) as error:
             print(f'{prog}: {in_words(error)}', file=sys.stderr)
             return 2
+
+    def _complete(self, words: Sequence[str]) -> None:
+        """Tell the shell how a line can go on; only the command that stands there is imported."""
+        from argcomplete import autocomplete
+
+        for word in words[1:2]:
+            if word in self.commands:
+                self.commands[word].load()
+        autocomplete(self.parser)
 
 
 def _suggestion(word: str, known: Mapping[str, Any] | Sequence[str]) -> str:

@@ -21,6 +21,7 @@ COMMANDS = set(entry.EXECUTABLES)
 # Third-party modules and the package.xml key (rosdep) that brings each.
 KEYS = {
     'aiohttp': 'python3-aiohttp',
+    'argcomplete': 'python3-argcomplete',
     'cv2': 'python3-opencv',
     'matplotlib': 'python3-matplotlib',
     'numpy': 'python3-numpy',

@@ -1,5 +1,6 @@
 """The command line answers at once: a command's module is imported when the command is chosen."""
 
+import os
 import subprocess
 import sys
 from importlib import import_module
@@ -93,3 +94,21 @@ def test_a_wrong_option_gets_one_line(capsys):
         main(['map', '--steps', 'many'])
     assert end.value.code == 2
     assert capsys.readouterr().err.count('\n') == 1
+
+
+@pytest.mark.parametrize(
+    ('line', 'words'),
+    [
+        ('dcdrw tr', {'trial', 'track'}),
+        ('dcdrw map --sp', {'--spokes'}),
+        ('dcdrw urdf --preset ', {'paper', 'paper-sweep'}),
+        ('dcdrw analyze --expect sy', {'synchronized'}),
+    ],
+)
+def test_the_shell_completes(line, words, tmp_path):
+    """By the protocol of argcomplete, whose answer goes to file descriptor 8."""
+    answer = tmp_path / 'answer'
+    script = f'exec {sys.executable} -m dcdrw.cli 8>{answer} 9>/dev/null'
+    environment = {'_ARGCOMPLETE': '1', '_ARGCOMPLETE_IFS': '\n', 'COMP_LINE': line, 'COMP_POINT': str(len(line))}
+    subprocess.run(['sh', '-c', script], cwd=ROOT, env={**os.environ, **environment, 'COMP_TYPE': '9'}, check=True)
+    assert {word.strip() for word in answer.read_text().split('\n')} == words

@@ -23,7 +23,7 @@ from dcdrw_sim.study.sweep import (
     targets,
 )
 from dcdrw_sim.study.sweep_dataset import VARIABLES, open_sweep, sweep_of, to_dataset
-from dcdrw_sim.study.sweep_run import Progress, run_sweep
+from dcdrw_sim.study.sweep_run import Progress, is_complete, run_sweep
 from dcdrw_sim.study.verdict import Verdict
 
 SMALL = Sweep(preset('paper-sweep'), Axis('k', (1e-4, 1e-3, 1e-2)), Axis('b', (0.1, 0.3, 1.0, 3.0)), 80.0, (0.35, 0.6))
@@ -287,6 +287,37 @@ def test_another_sweep_does_not_go_on_with_this_one(tmp_path, one_by_one):
     run(SMALL, path)
     with pytest.raises(ValueError, match=r'sweep\.nc holds a sweep that differs in rig, seconds'):
         run(changed, path)
+
+
+def test_a_folder_that_no_sweep_made_is_left_alone(tmp_path, one_by_one):
+    folder = tmp_path / 'sweep.nc.parts'
+    folder.mkdir()
+    with pytest.raises(ValueError, match=r'sweep\.nc\.parts exists already and holds no unfinished sweep'):
+        run(SMALL, tmp_path / 'sweep.nc')
+    (folder / 'notes.txt').write_text('mine')
+    with pytest.raises(ValueError, match='holds no unfinished sweep'):
+        run(SMALL, tmp_path / 'sweep.nc')
+    assert [path.name for path in tmp_path.rglob('*')] == ['sweep.nc.parts', 'notes.txt']
+
+
+def test_what_others_put_into_the_folder_of_a_sweep_stays(tmp_path, one_by_one):
+    with pytest.raises(Stop):
+        run(SMALL, tmp_path / 'sweep.nc', stop)
+    (tmp_path / 'sweep.nc.parts' / 'notes.txt').write_text('mine')
+    run(SMALL, tmp_path / 'sweep.nc')
+    assert [path.name for path in (tmp_path / 'sweep.nc.parts').iterdir()] == ['notes.txt']
+
+
+def test_another_sweep_is_overwritten_by_force_alone(tmp_path, one_by_one):
+    path, other = tmp_path / 'sweep.nc', SMALL._replace(rig=SMALL.rig._replace(slope=0.04))
+    run(SMALL, path)
+    with pytest.raises(ValueError, match='holds a sweep that differs in rig'):
+        run(other, path)
+    run_sweep(other, path, ThreadPoolExecutor(1), 2, force=True)
+    assert is_complete(path, other)
+    path.write_text('no sweep at all')
+    run_sweep(other, path, ThreadPoolExecutor(1), 2, force=True)
+    assert is_complete(path, other)
 
 
 def test_a_sweep_that_is_done_is_not_done_again(tmp_path):
