@@ -32,7 +32,12 @@ def number(text: str) -> int | float | None:
         digits = text.lstrip('+-')
         value = int(digits, 16 if digits[:2] in ('0x', '0X') else 8 if digits[0] == '0' else 10)
         value = -value if text[0] == '-' else value
-        return value if -(2**63) <= value < 2**63 else float(value)
+        if -(2**63) <= value < 2**63:
+            return value
+        try:
+            return float(value)
+        except OverflowError:
+            return math.copysign(math.inf, value)
     if _FLOAT.fullmatch(text):
         return float(re.sub(r'\.(?=inf|nan)', '', text, flags=re.IGNORECASE))
     return None

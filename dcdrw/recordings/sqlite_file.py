@@ -62,7 +62,7 @@ class SqliteFile(BagFile):
             self._open()
         except (sqlite3.Error, UnicodeError, OverflowError, TypeError) as error:
             self.close()
-            raise ValueError(f'{name} cannot be read: {error}') from None
+            raise ValueError(f'{name} cannot be read: {" ".join(str(error).split())[:200]}') from None
         except BaseException:
             self.close()
             raise
