@@ -35,9 +35,10 @@ function connect() {
   mine.onmessage = ({ data }) => {
     if (mine !== socket) return;
     if (first) forget();  // the first message brings all that the charts need
-    for (const news of JSON.parse(data)) take(news, first);
+    const { age, frames } = JSON.parse(data);
+    heardAt = performance.now() - 1000 * age;  // the server replays its last frames, also where no new ones come
+    for (const news of frames) take(news, first);
     first = false;
-    heardAt = performance.now();
     wait = FIRST_WAIT_MS;
     later(reconnect, DEAD_MS);
     schedule();
@@ -73,7 +74,7 @@ function take(news, old) {
     kept = { phis: [], forces: [], falls: [] };
   }
   frame = news;
-  frameAt = performance.now();
+  frameAt = heardAt;
   if (news.board) board = news.board;
   for (const [name, list] of Object.entries(kept)) {
     list.push(...(news[name] || []));
@@ -155,7 +156,7 @@ function showFigures(rig) {
   if (!board) return;
   element('slope').textContent = `on a slope of ${(board.slope * 180 / Math.PI).toFixed(2)}°`;
   element('ratio').textContent = board.ratio === null ? '[%]' : `[%], a step leaves ${(100 * board.ratio).toFixed(0)} %`;
-  element('rate').textContent = known && board.rate ? `${board.rate} samples per second` : '';
+  element('rate').textContent = known && board.rate ? `${board.rate} samples per second${board.left_out}` : '';
 }
 
 const MARKS = { OK: '✓', WARN: '!', ERROR: '✕', STALE: '?' };

@@ -9,11 +9,13 @@ import asyncio
 import hmac
 import ipaddress
 import json
+import math
 import os
 import socket
 import threading
+import time
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
@@ -34,6 +36,8 @@ _REQUEST_SECONDS = 5.0
 """So long a connection may take to ask for something [s]."""
 _IDLE_SECONDS = 15.0
 """So long one stays open between two requests [s]."""
+LONGEST_AGE = 1e6
+"""What no frame has ever come for is this old [s]."""
 _BROWSERS = 32
 """Browsers at a time."""
 _HEADERS = {
@@ -87,6 +91,7 @@ class PageServer:
         """Connections over which a whole request has come."""
         self._files = {path: ((PAGE / name).read_bytes(), kind) for path, (name, kind) in _FILES.items()}
         self._frames: deque[str] = deque(maxlen=kept)
+        self._fresh_at = -math.inf
         self._count = 0
         self._browsers: set[web.WebSocketResponse] = set()
         self._loop = asyncio.new_event_loop()
@@ -107,6 +112,7 @@ class PageServer:
 
     def _append(self, text: str) -> None:
         self._frames.append(text)
+        self._fresh_at = time.monotonic()
         self._count += 1
         self._fresh.set()
         self._fresh.clear()
@@ -188,7 +194,7 @@ class PageServer:
                     except ValueError as error:
                         notice = {'text': str(error), 'ok': False}
                         with suppress(ConnectionError):
-                            await browser.send_str(json.dumps([{'notices': [notice]}]))
+                            await browser.send_str(self._message([json.dumps({'notices': [notice]})]))
         finally:
             self._browsers.discard(browser)
             feed.cancel()
@@ -204,7 +210,12 @@ class PageServer:
                     continue
                 seen = self._count
                 frames = islice(self._frames, len(self._frames) - missed, None)
-                await browser.send_str(f'[{",".join(frames)}]')
+                await browser.send_str(self._message(frames))
+
+    def _message(self, frames: Iterable[str]) -> str:
+        """Frames as browsers get them, with how long ago the newest of all was made [s]: it may be a replay."""
+        age = min(time.monotonic() - self._fresh_at, LONGEST_AGE)
+        return f'{{"age":{age:.3f},"frames":[{",".join(frames)}]}}'
 
 
 async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:

@@ -8,9 +8,12 @@ import math
 from collections import deque
 from typing import Any, NamedTuple
 
-from dcdrw.suite.executables import EXECUTABLES, RECORDER, SIMULATOR, SYNC_MONITOR
+from dcdrw.suite.executables import EXECUTABLES, PHASE_ESTIMATOR, RECORDER, SIMULATOR, SYNC_MONITOR
 from dcdrw.suite.parameter_file import TrialParams
 from dcdrw_msgs_py.diagnosis import (
+    LOST_SAMPLES,
+    REFUSED,
+    RESTARTS,
     Diagnosis,
     Level,
     PairState,
@@ -50,6 +53,7 @@ LATE_DATA = 'late_data'
 LONGEST_MESSAGE = 200
 """Of what a node says of itself, so much is shown [characters]."""
 
+_LEFT_OUT = (LOST_SAMPLES, 'missing'), (REFUSED, 'refused'), (RESTARTS, 'times begun anew')
 _SUITE = {node.name for node in EXECUTABLES}
 CONTROLS = {field.name: field for field in fields(RigParams) if field.name in ('k', 'b', 'slope')}
 """What the page's sliders set."""
@@ -310,6 +314,7 @@ class LiveState:
             'pitch_deg': math.degrees(phi_pitch(params.sync.front, params.sync.rear)),
             'band_percent': params.sync.band_percent,
             'rate': _rounded(self._rate, 0),
+            'left_out': self._left_out(now),
             'steps': status.steps,
             'errors': [_rounded(error, 2) for error in status.history[-STEPS_SHOWN:]],
             'entered': status.steps_to_synchronization,
@@ -321,6 +326,12 @@ class LiveState:
             'recorder': recorder is not None,
             'recording': recorder is not None and recorder.state(RecorderState) is RecorderState.RECORDING,
         }
+
+    def _left_out(self, now: float) -> str:
+        """What the estimator says that is missing, refused or begun anew; empty where nothing is."""
+        said = self._says(PHASE_ESTIMATOR.name, now)
+        counts = [(said.number(key), word) for key, word in _LEFT_OUT] if said else []
+        return ''.join(f', {count:.0f} {word}' for count, word in counts if count > 0.0)
 
     def _node(self, name: str, now: float) -> dict[str, Any]:
         said, at = self._health[name]

@@ -6,6 +6,7 @@ import socket
 import struct
 import subprocess
 import sys
+import time
 from collections.abc import Awaitable, Callable, Iterator
 from typing import Any
 
@@ -185,12 +186,27 @@ def test_browser_that_comes_late_gets_what_is_kept_then_each_frame(served):
         async with client.ws_connect(f'{served.address}/ws') as browser:
             frames: list[dict[str, int]] = []
             while not frames or frames[-1]['i'] < 7:
-                frames += await browser.receive_json()
+                frames += (await browser.receive_json())['frames']
             assert frames == [{'i': i} for i in range(3, 8)]
             served.server.show({'i': 8})
-            assert await browser.receive_json() == [{'i': 8}]
+            assert (await browser.receive_json())['frames'] == [{'i': 8}]
 
     browse(visit)
+
+
+def test_what_is_replayed_tells_how_old_it_is(served):
+    served.server.show({'i': 0})
+
+    async def first(client: ClientSession) -> dict[str, Any]:
+        async with client.ws_connect(f'{served.address}/ws') as browser:
+            return dict(await browser.receive_json())
+
+    begun = time.monotonic()
+    young = browse(first)
+    time.sleep(0.3)  # the node hangs
+    old = browse(first)
+    assert young['frames'] == old['frames'] == [{'i': 0}]
+    assert 0.3 <= old['age'] - young['age'] + 0.01 <= time.monotonic() - begun + 0.02
 
 
 def test_all_browsers_get_the_same(served):
@@ -202,7 +218,7 @@ def test_all_browsers_get_the_same(served):
         for browser in browsers:
             seen: list[int] = []
             while not seen or seen[-1] < 19:
-                seen += [frame['i'] for frame in await browser.receive_json()]
+                seen += [frame['i'] for frame in (await browser.receive_json())['frames']]
             assert seen == list(range(seen[0], 20))
             await browser.close()
 
@@ -217,11 +233,11 @@ def test_browser_that_does_not_read_costs_no_more_than_what_is_kept(served):
             async with client.ws_connect(f'{served.address}/ws', max_msg_size=0) as quick:
                 for i in range(400):  # 40 MB: far more than the sockets take
                     served.server.show({'i': i, 'big': big})
-                    while (await quick.receive_json())[-1]['i'] < i:
+                    while (await quick.receive_json())['frames'][-1]['i'] < i:
                         pass
             seen: list[int] = []
             while not seen or seen[-1] < 399:
-                frames = await slow.receive_json()
+                frames = (await slow.receive_json())['frames']
                 assert len(frames) <= KEPT
                 seen += [frame['i'] for frame in frames]
             assert len(seen) < 300
@@ -235,8 +251,8 @@ def test_wrong_command_is_answered_and_a_right_one_handed_on(served):
         async with client.ws_connect(f'{served.address}/ws') as browser:
             for text in ('{"do": "set", "name": "k", "value": -1}', '{', '[' * 500, '{"do": "set", "name": {}}'):
                 await browser.send_str(text)
-                ((frame,), ok) = await browser.receive_json(), False
-                assert frame['notices'][0]['ok'] is ok
+                (frame,) = (await browser.receive_json())['frames']
+                assert frame['notices'][0]['ok'] is False
             await browser.send_str('{"do": "set", "name": "k", "value": 3}')
             while not served.commands:
                 await asyncio.sleep(0.01)

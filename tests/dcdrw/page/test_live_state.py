@@ -13,7 +13,17 @@ from hypothesis import strategies as st
 
 from dcdrw.page.live_state import LATE_DATA, STEPS_SHOWN, STRANGERS_SHOWN, Command, LiveState, read_command
 from dcdrw.suite.parameter_file import TrialParams
-from dcdrw_msgs_py.diagnosis import STATE, Diagnosis, Level, PairState, RecorderState, SourceState
+from dcdrw_msgs_py.diagnosis import (
+    LOST_SAMPLES,
+    REFUSED,
+    RESTARTS,
+    STATE,
+    Diagnosis,
+    Level,
+    PairState,
+    RecorderState,
+    SourceState,
+)
 from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_msgs_py.samples import CouplerSample, Footfall, JointSample, PhaseSample, Turn
 from dcdrw_sim.rig.simulator import SimulatedRig
@@ -227,6 +237,14 @@ def test_node_that_falls_silent_is_stale_and_its_controls_are_off():
     board = state.frame(4.0)['board']
     assert (board['simulated'], board['recorder']) == (False, False)
     assert board['nodes'][1] == {'name': 'simulator', 'level': 'STALE', 'message': 'silent for 4 s'}
+
+
+def test_what_is_missing_and_refused_is_said_beside_the_rate():
+    state = LiveState(TrialParams())
+    assert state.frame(0.0)['board']['left_out'] == ''
+    counts = {LOST_SAMPLES: 4, REFUSED: '3', RESTARTS: 0}
+    state.take_health('phase_estimator', Diagnosis(Level.OK, '', counts), 1.0)
+    assert state.frame(1.0)['board']['left_out'] == ', 4 missing, 3 refused'
 
 
 def test_strangers_push_out_none_of_the_suite_and_take_little_room():
