@@ -168,7 +168,7 @@ class Timeline:
         self._anchor = now, 0.0
         self._rate = rate
         self._first, self._index = 0.0, 0
-        self._held_for = 0.0
+        self._held_for = self._least = 0.0
 
     @property
     def due(self) -> float:
@@ -177,8 +177,8 @@ class Timeline:
 
     @property
     def rig_time(self) -> float:
-        """Rig time of the next sample [s]."""
-        return max(self.due - self._held_for, 0.0)
+        """Rig time of the next sample [s]: never before that of the last one, by rounding neither."""
+        return max(self.due - self._held_for, self._least)
 
     def reached(self, now: float) -> float:
         """Stamp time that the pace has reached at a clock's reading [s]; infinite as fast as possible."""
@@ -187,7 +187,7 @@ class Timeline:
 
     def step(self, held: bool) -> None:
         """Go on to the next sample; a held rig does not age."""
-        due = self.due
+        due, self._least = self.due, self.rig_time
         self._index += 1
         if held:
             self._held_for += self.due - due

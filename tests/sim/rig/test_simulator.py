@@ -87,3 +87,14 @@ def test_change_of_the_coupler_holds_from_the_present_on():
 def test_same_seed_makes_the_same_noise():
     one, other = (SimulatedRig(RigParams(), SimulatorParams(noise_deg=1.0, seed=seed)) for seed in (3, 3))
     assert [one.read(k / 10, k) for k in range(20)] == [other.read(k / 10, k) for k in range(20)]
+
+
+@given(st.sampled_from([1000.0, 997.0, 60.0]), st.lists(st.tuples(st.integers(1, 3000), st.booleans()), max_size=6))
+def test_the_time_of_a_rig_that_is_held_stands_and_never_goes_back(rate, spans):
+    timeline = Timeline(rate, 1.0, 0.0)
+    last = timeline.rig_time
+    for samples, held in spans:
+        for _ in range(samples):
+            timeline.step(held)
+            assert timeline.rig_time >= last
+            last = timeline.rig_time
