@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -84,8 +85,10 @@ def test_altered_recording_is_found_out(live_trial, tmp_path):
     with Recording(live_trial) as recording:
         joints = list(recording.messages(['/joint_states']))
         phases = [data for _, _, data in recording.messages(['/phase_state'])]
-    changed = bytearray(phases[500])
-    changed[-36] ^= 1  # the last digit of the front wheel's speed
+    message = TYPES.deserialize_cdr(phases[500], JOINT_STATE)
+    speeds = message.velocity.copy()
+    speeds[0] = np.nextafter(speeds[0], np.inf)  # the front wheel's, by its last bit
+    changed = TYPES.serialize_cdr(replace(message, velocity=speeds), JOINT_STATE)
     with Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         topics = [
             writer.add_connection(name, JOINT_STATE, typestore=TYPES) for name in ('/joint_states', '/phase_state')
