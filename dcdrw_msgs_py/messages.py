@@ -9,6 +9,7 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PointStamped
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 
 from dcdrw_msgs_py.diagnosis import Diagnosis, Level, value_text
 from dcdrw_msgs_py.rig import FRONT, REAR
@@ -20,8 +21,8 @@ from dcdrw_msgs_py.samples import (
     JointSample,
     LoneWheel,
     PhaseSample,
+    Runs,
     Turn,
-    run_of,
 )
 from dcdrw_msgs_py.topics import (
     COUPLER,
@@ -102,6 +103,8 @@ class JointSampleReader:
     """Reads `joint_states`; joints of other names are ignored."""
 
     def __init__(self, front: str = FRONT_WHEEL, rear: str = REAR_WHEEL, coupler: str = COUPLER) -> None:
+        self.runs = Runs()
+        """What the source has announced on `run`."""
         self._joints = Joints((front, rear), (coupler,))
         self._any = Joints((), (front, rear, coupler))
         self._wheels = {FRONT: front, REAR: rear}
@@ -119,7 +122,7 @@ class JointSampleReader:
             Turn(*front[:2]),
             Turn(*rear[:2]),
             CouplerSample(*coupler),
-            run_of(message.header.frame_id),
+            self.runs.of(stamp_ns(message.header.stamp)),
         )
 
     def read_any(self, message: Any) -> JointSample | LoneWheel:
@@ -138,7 +141,7 @@ class JointSampleReader:
             present[0],
             Turn(*(front if present[0] == FRONT else rear)[:2]),
             CouplerSample(*coupler),
-            run_of(message.header.frame_id),
+            self.runs.of(stamp_ns(message.header.stamp)),
         )
 
 
@@ -183,7 +186,6 @@ class JointSampleWriter:
         """The message of a sample; valid until the next call."""
         message, (length, rate, force) = self._message, sample.coupler
         message.header.stamp = to_stamp(sample.stamp_ns)
-        message.header.frame_id = f'{RUN}{sample.run}' if sample.run else ''
         message.position = array('d', (sample.front.angle, sample.rear.angle, length))
         message.velocity = array('d', (sample.front.rate, sample.rear.rate, rate))
         message.effort = array('d', (math.nan, math.nan, force))
@@ -214,6 +216,11 @@ class PhaseSampleWriter:
         message.position = array('d', (front.angle, rear.angle, phi.angle, difference, steps1, steps2, restarts))
         message.velocity = array('d', (front.rate, rear.rate, phi.rate, 0.0, 0.0, 0.0, 0.0))
         return message
+
+
+def run_message(stamp: int, number: int) -> Any:
+    """The announcement of a run: the stamp of its first sample [ns], and its number."""
+    return Header(stamp=to_stamp(stamp), frame_id=f'{RUN}{number}')
 
 
 def footfall_message(footfall: Footfall) -> Any:

@@ -27,9 +27,10 @@ from rclpy.signals import SignalHandlerOptions
 
 from dcdrw_msgs_py.diagnosis import Diagnosis, Level
 from dcdrw_msgs_py.executor import StreamExecutor
-from dcdrw_msgs_py.messages import diagnostics_message
+from dcdrw_msgs_py.messages import diagnostics_message, stamp_ns
 from dcdrw_msgs_py.quantity import Field, build, fields, flatten
-from dcdrw_msgs_py.topics import DIAGNOSTICS, SAMPLE_DEPTH, Topic
+from dcdrw_msgs_py.samples import Runs
+from dcdrw_msgs_py.topics import DIAGNOSTICS, RUNS, SAMPLE_DEPTH, Topic
 
 Params = TypeVar('Params', bound=tuple[Any, ...])
 
@@ -194,6 +195,11 @@ def listen(node: Node, topic: Topic, callback: Callable[[Any], None], depth: int
         return node.create_subscription(message_type(topic), topic.name, callback, qos)
     qos = QoSProfile(depth=max(topic.depth, depth), reliability=ReliabilityPolicy.BEST_EFFORT)
     return node.create_subscription(message_type(topic), topic.name, Inbox(callback).__call__, qos)
+
+
+def follow_runs(node: Node, runs: Runs) -> Any:
+    """Hear what the source announces; subscribe to the samples after this, for what is ready is read in this order."""
+    return listen(node, RUNS, lambda message: runs.announce(stamp_ns(message.stamp), message.frame_id))
 
 
 def dropped(node: Node) -> dict[str, int]:

@@ -1,19 +1,42 @@
 """Samples: what passes between the cores, as plain data. Time arrives in the sample; no core has a clock."""
 
 import math
+from bisect import bisect_right
 from typing import NamedTuple
 
 NAN = math.nan
 SECOND = 1_000_000_000
 """[ns]"""
 RUN = 'run_'
-"""The frame of joint_states and phase_state, with a number, tells runs apart: counts start afresh with each."""
+"""A source announces a run on the topic `run` by this, with a number."""
 
 
-def run_of(frame: str) -> int:
-    """The run that a message's frame tells; 0 where it tells none."""
-    other, _, number = frame.partition(RUN)
-    return int(number) if number.isdecimal() and not other else 0
+class Runs:
+    """The runs of a source, as it announces them: counts start afresh with each."""
+
+    def __init__(self) -> None:
+        self._starts: list[int] = []
+        self._numbers: list[int] = []
+
+    def announce(self, stamp_ns: int, name: str) -> None:
+        """Take an announcement: the stamp of a run's first sample, and its name. One of another form is passed over."""
+        other, _, number = name.partition(RUN)
+        if other or not number.isdecimal():
+            return
+        while self._starts and self._starts[-1] >= stamp_ns:  # the source's time went back
+            del self._starts[-1], self._numbers[-1]
+        self._starts.append(stamp_ns)
+        self._numbers.append(int(number))
+        del self._starts[:-MOST_RUNS], self._numbers[:-MOST_RUNS]
+
+    def of(self, stamp_ns: int) -> int:
+        """The run of a sample with this stamp; 0 where the source told none."""
+        place = bisect_right(self._starts, stamp_ns)
+        return self._numbers[place - 1] if place else 0
+
+
+MOST_RUNS = 1000
+"""So many runs are kept."""
 
 
 class Turn(NamedTuple):

@@ -29,6 +29,13 @@ JOINT_STATES = Topic(
     'rotation and speed of both wheels; the coupler where known',
     SAMPLE_DEPTH,
 )
+RUNS = Topic(
+    'run',
+    'std_msgs/msg/Header',
+    'the source starts anew: stamp of the first sample, run_N as frame_id; within a run no turn is lost',
+    1,
+    latched=True,
+)
 COUPLER_FORCE_COMMAND = Topic(
     'coupler_force_command', 'std_msgs/msg/Float64', 'force added to the coupler, N; zero when stale'
 )

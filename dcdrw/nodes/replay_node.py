@@ -12,11 +12,12 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from dcdrw.recordings.bag_file import Message
+from dcdrw.recordings.recorded_runs import runs_topic
 from dcdrw.recordings.recording import Recording
 from dcdrw_msgs_py.messages import to_stamp
 from dcdrw_msgs_py.node import advertise, steady_clock
 from dcdrw_msgs_py.samples import SECOND
-from dcdrw_msgs_py.topics import CLOCK, JOINT_STATES
+from dcdrw_msgs_py.topics import CLOCK, JOINT_STATES, RUNS
 
 TICK_SECONDS = 0.001
 LOOK_SECONDS = 0.05
@@ -51,10 +52,14 @@ class ReplayNode(Node):
         self._recording, self._topic, self._part, self._names = recording, topic, part, names
         self._joints = advertise(self, JOINT_STATES)
         self._clock = advertise(self, CLOCK)
+        self._runs = advertise(self, RUNS)
+        self._announced: list[Message] = []
         self.sent = 0
         self.log_ns = part.begin_ns
         """Where in the recording the replay is."""
         self.done = False
+        runs = runs_topic(topic)
+        self._runs_topic = runs if recording.types.get(runs) == RUNS.type else ''
         self._found: tuple[int, ...] = ()
         self._since = time.monotonic()
         self._messages: Iterator[Message] = iter(())
@@ -68,6 +73,7 @@ class ReplayNode(Node):
     def _begin(self) -> None:
         part = self._part
         self._messages = self._recording.messages([self._topic], part.begin_ns, part.end_ns)
+        self._announced = list(self._recording.messages([self._runs_topic])) if self._runs_topic else []
         self._next = next(self._messages, None)
         self._next_ns = _stamp_ns(self._next) if self._next else 0
         self._due_ns = 0
@@ -117,6 +123,8 @@ class ReplayNode(Node):
         if not 0 <= stamp_ns - self._told_ns < CLOCK_NS:  # the clock first: no sample lies far in the future
             self._told_ns = stamp_ns
             self._clock.publish(Clock(clock=to_stamp(stamp_ns)))
+        while self._announced and _stamp_ns(self._announced[0]) <= stamp_ns:  # the run before its first sample
+            self._runs.publish(self._announced.pop(0).data)
         if self._names:
             joints = deserialize_message(message.data, JointState)
             joints.name = [self._names.get(name, name) for name in joints.name]

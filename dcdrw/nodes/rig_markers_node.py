@@ -12,7 +12,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from dcdrw.drawings.rig_markers import MarkerParams, RigView, Shape, about_y
 from dcdrw_msgs_py.diagnosis import Diagnosis, Level
 from dcdrw_msgs_py.messages import JointSampleReader, diagnoses
-from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
+from dcdrw_msgs_py.node import Age, Parameters, advertise, follow_runs, listen, report, run, steady_clock
 from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, RIG_MARKERS
 
 STALE_AFTER = 1.0
@@ -42,6 +42,7 @@ class RigMarkersNode(Node):
         report(self, self._diagnose)
         self.create_timer(1.0 / params.redraw_rate, self._tick, clock=steady_clock())
         listen(self, DIAGNOSTICS, self._on_diagnostics)
+        follow_runs(self, self._reader.runs)
         listen(self, JOINT_STATES, self._on_joints)
 
     def _on_joints(self, message: Any) -> None:

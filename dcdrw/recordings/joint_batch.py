@@ -22,6 +22,8 @@ class JointBatch(NamedTuple):
     """Why these messages cannot be read; empty where they can."""
     log_ns: NDArray[np.int64] = np.empty(0, np.int64)
     """When the recorder got each; empty where that is not known."""
+    run: NDArray[np.int64] = np.empty(0, np.int64)
+    """The source's run of each; empty where it told none."""
 
     @property
     def messages(self) -> int:

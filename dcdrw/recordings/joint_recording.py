@@ -9,10 +9,11 @@ import numpy as np
 from dcdrw.recordings.recorder import PARAMETERS, Recorder, offered_qos
 from dcdrw.suite.parameter_file import given, write_changed
 from dcdrw_msgs_py.samples import RUN, JointSample
-from dcdrw_msgs_py.topics import JOINT_STATES
+from dcdrw_msgs_py.topics import JOINT_STATES, RUNS
 from dcdrw_tracker.gait.phase import PhaseParams
 
 TOPIC = f'/{JOINT_STATES.name}'
+RUNS_TOPIC = f'/{RUNS.name}'
 
 
 def record_joints(
@@ -41,13 +42,19 @@ def record_joints(
     values = {name: value for one in params for name, value in given(one).items()}
     write_changed(None, values, folder / PARAMETERS, 'What the joint states were made with.')
     recorder.add_topic(TOPIC, JOINT_STATES.type, [offered_qos(True, False, JOINT_STATES.depth)])
-    serialize = _serializer(names)
+    recorder.add_topic(RUNS_TOPIC, RUNS.type, [offered_qos(True, True, RUNS.depth)])
+    serialize, announce = _serializers(names)
+    run = 0
     for sample in samples:
+        if sample.run != run:
+            run = sample.run
+            recorder.write(RUNS_TOPIC, announce(sample), sample.stamp_ns)
         recorder.write(TOPIC, serialize(sample), sample.stamp_ns)
     recorder.close()
 
 
-def _serializer(names: PhaseParams) -> Any:
+def _serializers(names: PhaseParams) -> tuple[Any, Any]:
+    """A joint state's bytes, and those of the run that it begins."""
     from rosbags.typesys import Stores, get_typestore
 
     types = get_typestore(Stores.ROS2_JAZZY)
@@ -57,9 +64,8 @@ def _serializer(names: PhaseParams) -> Any:
 
     def serialize(sample: JointSample) -> bytes:
         (psi1, omega1), (psi2, omega2) = sample.front, sample.rear
-        frame = f'{RUN}{sample.run}' if sample.run else ''
         message = state(
-            header(time(*divmod(sample.stamp_ns, 10**9)), frame),
+            header(time(*divmod(sample.stamp_ns, 10**9)), ''),
             [names.front_joint, names.rear_joint],
             np.array((psi1, psi2)),
             np.array((omega1, omega2)),
@@ -67,4 +73,8 @@ def _serializer(names: PhaseParams) -> Any:
         )
         return bytes(types.serialize_cdr(message, JOINT_STATES.type))
 
-    return serialize
+    def announce(sample: JointSample) -> bytes:
+        message = header(time(*divmod(sample.stamp_ns, 10**9)), f'{RUN}{sample.run}')
+        return bytes(types.serialize_cdr(message, RUNS.type))
+
+    return serialize, announce

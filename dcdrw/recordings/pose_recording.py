@@ -12,7 +12,7 @@ from dcdrw.recordings.leg_recording import find_topic
 from dcdrw.recordings.recording import BATCH, Recording
 from dcdrw.suite.parameter_file import read_parameter_file
 from dcdrw_msgs_py.rig import FRONT, REAR
-from dcdrw_msgs_py.samples import RUN, SECOND, JointSample, PoseSample
+from dcdrw_msgs_py.samples import SECOND, JointSample, PoseSample
 from dcdrw_msgs_py.topics import FRONT_POSE, FRONT_WHEEL, REAR_POSE, REAR_WHEEL
 from dcdrw_tracker.wheels.poses import PosePairs, PoseParams
 from dcdrw_tracker.wheels.wheel_angles import WheelAngles
@@ -79,12 +79,13 @@ def _pose(message: Any) -> PoseSample:
 def _joints(samples: list[Any], run: int) -> JointBatch:
     turns = np.array([(*sample.front, *sample.rear) for sample in samples])
     return JointBatch(
-        f'{RUN}{run}',
+        '',
         (FRONT_WHEEL, REAR_WHEEL),
         np.array([sample.stamp_ns for sample in samples], np.int64),
         turns[:, ::2],
         turns[:, 1::2],
         np.full((len(samples), 2), np.nan),
+        run=np.full(len(samples), run, np.int64),
     )
 
 

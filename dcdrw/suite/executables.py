@@ -33,6 +33,7 @@ from dcdrw_msgs_py.topics import (
     REAR_TORQUE_COMMAND,
     RIG_MARKERS,
     ROSOUT,
+    RUNS,
     STEP_DIFFERENCE,
     SYNC_ERROR,
     SYNC_ERROR_PERCENT,
@@ -77,7 +78,7 @@ SIMULATOR = Executable(
     'the rig in simulation, in the place of the real one',
     (RigParams, SimulatorParams),
     (COUPLER_FORCE_COMMAND, REAR_TORQUE_COMMAND),
-    (JOINT_STATES, PERSON_FORCE, CLOCK, DIAGNOSTICS),
+    (JOINT_STATES, RUNS, PERSON_FORCE, CLOCK, DIAGNOSTICS),
     ('~/reset (std_srvs/srv/Trigger)', '~/pause (std_srvs/srv/SetBool)'),
     by_choice=(PERSON_FORCE,),
 )
@@ -85,7 +86,7 @@ PHASE_ESTIMATOR = Executable(
     'phase_estimator',
     'from wheel rotations to phase, steps and footfalls',
     (PhaseParams,),
-    (JOINT_STATES,),
+    (JOINT_STATES, RUNS),
     (PHASE_STATE, PHI, STEP_DIFFERENCE, *FOOTFALLS.values(), DIAGNOSTICS),
 )
 SYNC_MONITOR = Executable(
@@ -100,7 +101,7 @@ MARKERS = Executable(
     'rig_markers',
     'the rig as markers, for RViz and Foxglove',
     (MarkerParams,),
-    (JOINT_STATES, DIAGNOSTICS),
+    (JOINT_STATES, RUNS, DIAGNOSTICS),
     (RIG_MARKERS, DIAGNOSTICS),
 )
 
@@ -117,7 +118,7 @@ VIRTUAL_CAMERA = Executable(
     'virtual_camera',
     'pictures of the rig, as a camera on its left would take them',
     (SceneParams, ViewParams, LookParams, TagParams, ShutterParams),
-    (JOINT_STATES,),
+    (JOINT_STATES, RUNS),
     (IMAGE_RAW, CAMERA_INFO, DIAGNOSTICS),
 )
 
@@ -126,7 +127,7 @@ TAG_TRACKER = Executable(
     "from a camera's pictures, or motion capture, to wheel rotations",
     (TagParams, PairViewParams, TrackParams, PoseParams, SourceParams),
     (IMAGE_RAW, IMAGE_COMPRESSED, CAMERA_INFO, FRONT_POSE, REAR_POSE),
-    (JOINT_STATES, TAG_DETECTIONS, DEBUG_IMAGE, DIAGNOSTICS),
+    (JOINT_STATES, RUNS, TAG_DETECTIONS, DEBUG_IMAGE, DIAGNOSTICS),
     by_choice=(IMAGE_COMPRESSED, FRONT_POSE, REAR_POSE),
 )
 

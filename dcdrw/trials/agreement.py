@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.recording import Recording
 from dcdrw.trials.analysis import Analysis, Floats, Integers
-from dcdrw_msgs_py.samples import run_of
 from dcdrw_msgs_py.topics import (
     FRONT_STANCE,
     PHASE_STATE,
@@ -94,10 +93,10 @@ def _read(recording: Recording, name: str) -> tuple[Integers, _Phases]:
 
 
 def _restarts(batch: JointBatch) -> Integers:
-    """How often the source had started anew; older recordings tell it in the frame."""
+    """How often the source had started anew."""
     if RESTARTS in batch.names:
         return batch.position[:, batch.names.index(RESTARTS)].astype(np.int64)
-    return np.full(batch.messages, run_of(batch.frame))
+    return np.zeros(batch.messages, np.int64)
 
 
 def _runs(numbers: NDArray[np.int64], phases: _Phases) -> Iterator[_Phases]:

@@ -16,7 +16,7 @@ from dcdrw.suite.parameter_file import TrialParams
 from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.rig import FRONT
 from dcdrw_msgs_py.rolling import phi_pitch
-from dcdrw_msgs_py.samples import SECOND, CouplerSample, Footfall, JointSample, PhaseSample, Turn, run_of
+from dcdrw_msgs_py.samples import SECOND, CouplerSample, Footfall, JointSample, PhaseSample, Turn
 from dcdrw_tracker.gait.cadence import GAP, CadenceStatus
 from dcdrw_tracker.gait.pair_state import judge
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseStatus
@@ -215,11 +215,10 @@ class _Trial:
         columns = (
             batch.stamp_ns,
             batch.log_ns if len(batch.log_ns) else np.zeros_like(batch.stamp_ns),
+            batch.run if len(batch.run) else np.zeros_like(batch.stamp_ns),
             *(table[:, wheel] for wheel in (front, rear) for table in (batch.position, batch.velocity)),
         )
-        rows, phases, errors, verdicts, clock_ns = self._follow(
-            [column.tolist() for column in columns], run_of(batch.frame)
-        )
+        rows, phases, errors, verdicts, clock_ns = self._follow([column.tolist() for column in columns])
         if not rows:
             return
         taken, (front_scale, rear_scale) = np.array(rows), joints.scales
@@ -253,7 +252,7 @@ class _Trial:
         return batch._replace(stamp_ns=np.where(missing, batch.log_ns, batch.stamp_ns))
 
     def _follow(
-        self, columns: list[list[Any]], run: int
+        self, columns: list[list[Any]]
     ) -> tuple[list[int], list[PhaseSample], list[float], list[bool], list[int]]:
         """Rows that were accepted, and what came of them: phase, error, verdict, and by how much the clock was set."""
         taken: list[int] = []
@@ -262,7 +261,7 @@ class _Trial:
         verdicts: list[bool] = []
         clocks: list[int] = []
         update, coupler = self._estimator.update, CouplerSample()
-        for row, (stamp_ns, log_ns, psi1, omega1, psi2, omega2) in enumerate(zip(*columns, strict=True)):
+        for row, (stamp_ns, log_ns, run, psi1, omega1, psi2, omega2) in enumerate(zip(*columns, strict=True)):
             joints = JointSample(stamp_ns, Turn(psi1, omega1), Turn(psi2, omega2), coupler, run)
             made = update(joints, arrival_ns=log_ns)
             if made is None:

@@ -21,7 +21,7 @@ from dcdrw_msgs_py.camera import Camera, read_camera
 from dcdrw_msgs_py.frame import Frame
 from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.rig import FRONT, REAR
-from dcdrw_msgs_py.samples import RUN, SECOND, JointSample
+from dcdrw_msgs_py.samples import SECOND, JointSample
 from dcdrw_msgs_py.tagging import TagParams
 from dcdrw_tracker.gait.phase import PhaseParams
 from dcdrw_tracker.node.debug_image import draw
@@ -210,12 +210,13 @@ def joint_batches(samples: Iterable[JointSample], names: PhaseParams) -> Iterato
         part = list(group)
         turns = np.array([(sample.front, sample.rear) for sample in part])
         yield JointBatch(
-            f'{RUN}{run}',
+            '',
             (names.front_joint, names.rear_joint),
             np.array([sample.stamp_ns for sample in part], np.int64),
             turns[:, :, 0],
             turns[:, :, 1],
             np.full(turns.shape[:2], math.nan),
+            run=np.full(len(part), run, np.int64),
         )
 
 

@@ -9,6 +9,7 @@ from dcdrw.files import to_json, write_csv, write_text, write_whole
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.leg_recording import find_topic, leg_topics, namespace_of, wheel_batches
 from dcdrw.recordings.pose_recording import pose_batches, pose_topics
+from dcdrw.recordings.recorded_runs import recorded_runs, with_runs
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw.trials.agreement import Agreement, compare
@@ -72,7 +73,8 @@ def _joint_states(
     legs, poses = ([], []) if namespace else (leg_topics(recording), pose_topics(recording))
     if not (legs or poses) or topic != JOINT_STATES.name or find_topic(recording, JOINT_STATES):
         name = recording.find(topic, namespace=namespace)
-        return name, _shown(recording.joints(name), recording.count(name))
+        batches = with_runs(recording.joints(name), recorded_runs(recording, name))
+        return name, _shown(batches, recording.count(name))
     if poses:
         return f'{poses[0].rpartition("/")[0]}/{topic}', pose_batches(recording, rig)
     updates = follow_recording(recording, rig).updates

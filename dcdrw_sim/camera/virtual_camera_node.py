@@ -9,7 +9,7 @@ from dcdrw_msgs_py.diagnosis import Diagnosis, Level
 from dcdrw_msgs_py.frame import Frame
 from dcdrw_msgs_py.image_messages import camera_message, image_message
 from dcdrw_msgs_py.messages import JointSampleReader
-from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
+from dcdrw_msgs_py.node import Age, Parameters, advertise, follow_runs, listen, report, run, steady_clock
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.tagging import TagParams
 from dcdrw_msgs_py.topics import CAMERA_INFO, IMAGE_RAW, JOINT_STATES
@@ -52,6 +52,7 @@ class VirtualCameraNode(Node):
         self._images = advertise(self, IMAGE_RAW)
         self._infos = advertise(self, CAMERA_INFO)
         report(self, self._diagnose)
+        follow_runs(self, self._reader.runs)
         listen(self, JOINT_STATES, self._on_joints)
         self.create_timer(1.0 / (LOOKS_PER_FRAME * params.frame_rate), self._take_frame, clock=steady_clock())
         self.get_logger().info(

@@ -41,6 +41,7 @@ class SimulatorNode(Node):
     """Publishes what a `SimulatedRig` does, at the pace of the node's clock, or of its own /clock."""
 
     _timeline: Timeline
+    _run: int
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('simulator', **kwargs)
@@ -170,6 +171,7 @@ class SimulatorNode(Node):
             response.success, response.message = False, str(error)
             return response
         self._failure = ''
+        self._run, self._announced = self._run + 1, False
         self._restart()
         self._report()
         response.success, response.message = True, 'the wheels are back at their start'

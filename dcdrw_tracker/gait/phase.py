@@ -233,7 +233,7 @@ class PhaseEstimator:
         if last is None:
             self._cadence.tick(stamp_ns)
             return self._start(joints)
-        if run != last.run:
+        if last.run and run != last.run:  # a run that is told late was that of the samples before
             self._cadence.tick(stamp_ns)
             return self._restart([_Held(joints, 'reversed', arrival_ns)], 'announced')
         elapsed_ns = stamp_ns - last.stamp_ns

@@ -15,7 +15,7 @@ from dcdrw_msgs_py.camera import Camera, read_camera
 from dcdrw_msgs_py.diagnosis import Diagnosis, Level
 from dcdrw_msgs_py.frame import Frame
 from dcdrw_msgs_py.image_messages import camera, compressed_frame, frame, image_message, pose, tag_message
-from dcdrw_msgs_py.messages import JointSampleWriter
+from dcdrw_msgs_py.messages import JointSampleWriter, run_message
 from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND, JointSample
@@ -28,6 +28,7 @@ from dcdrw_msgs_py.topics import (
     IMAGE_RAW,
     JOINT_STATES,
     REAR_POSE,
+    RUNS,
     TAG_DETECTIONS,
 )
 from dcdrw_tracker.node.debug_image import draw
@@ -65,6 +66,8 @@ class TagTrackerNode(Node):
         self._source = Parameters(self, SourceParams, validate=SourceParams.check_source).value
         # Not 1: a tracker that was started anew must not seem to go on with the run of the one before.
         self._run = first_run = time.time_ns() // SECOND
+        self._announced = 0
+        self._runs = advertise(self, RUNS)
         self._joint_states = advertise(self, JOINT_STATES)
         self._detections = advertise(self, TAG_DETECTIONS)
         self._debug_image = advertise(self, DEBUG_IMAGE)
@@ -212,6 +215,9 @@ class TagTrackerNode(Node):
     # --- both ------------------------------------------------------------------------------------------------------
 
     def _publish(self, sample: JointSample) -> None:
+        if sample.run != self._announced:
+            self._announced = sample.run
+            self._runs.publish(run_message(sample.stamp_ns, sample.run))
         if sample.run != self._run:
             self._run = sample.run
             self.get_logger().warning(

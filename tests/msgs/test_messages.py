@@ -17,6 +17,7 @@ from dcdrw_msgs_py.messages import (
     diagnostics_message,
     footfall,
     footfall_message,
+    run_message,
     stamp_ns,
     to_stamp,
 )
@@ -38,7 +39,14 @@ def test_stamps_survive(stamp):
     )
 )
 def test_joint_samples_survive(sample):
-    assert JointSampleReader().read(JointSampleWriter().write(sample)) == sample
+    reader = JointSampleReader()
+    if sample.run:
+        header = run_message(sample.stamp_ns, sample.run)
+        reader.runs.announce(stamp_ns(header.stamp), header.frame_id)
+    message = JointSampleWriter().write(sample)
+    assert reader.read(message) == sample
+    message.header.frame_id = 'run_9'  # a frame is no protocol
+    assert reader.read(message) == sample
 
 
 counts = st.integers(-1000, 1000)
