@@ -52,7 +52,9 @@ PERSON_FORCE = Topic(
 )
 ENABLE = Topic('enable', 'std_msgs/msg/Bool', 'heartbeat of at least 10 Hz that lets the robot push; expired is false')
 COUPLER_WRENCH = Topic(
-    'coupler_wrench', 'geometry_msgs/msg/WrenchStamped', 'the commanded force, stamped: force.x in N, tension positive'
+    'coupler_wrench',
+    'geometry_msgs/msg/WrenchStamped',
+    'what is commanded, stamped: force.x in N, tension positive; torque.y on the rear hub in N·m',
 )
 SYNCHRONIZER_STATE = Topic(
     'synchronizer_state', 'std_msgs/msg/String', 'disabled, armed, active, ramp_down or fault', 1, latched=True

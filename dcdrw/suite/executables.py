@@ -141,11 +141,12 @@ LEG_TRACKER = Executable(
 
 SYNCHRONIZER = Executable(
     'synchronizer',
-    'from the phase to a bounded force that brings the pair into step, while somebody enables it',
+    'from the phase to a bounded force, or torque, that brings the pair into step, while somebody enables it',
     (SynchronizerParams,),
     (PHASE_STATE, ENABLE),
-    (COUPLER_FORCE_COMMAND, COUPLER_WRENCH, SYNCHRONIZER_STATE, DIAGNOSTICS),
+    (COUPLER_FORCE_COMMAND, REAR_TORQUE_COMMAND, COUPLER_WRENCH, SYNCHRONIZER_STATE, DIAGNOSTICS),
     ('~/stop (std_srvs/srv/Trigger)', '~/reset_fault (std_srvs/srv/Trigger)'),
+    by_choice=(REAR_TORQUE_COMMAND,),
 )
 
 TRIAL = (SIMULATOR, PHASE_ESTIMATOR, SYNC_MONITOR)

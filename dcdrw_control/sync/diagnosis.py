@@ -32,6 +32,7 @@ def diagnose_synchronizer(core: Synchronizer, command: Command, age: float) -> D
             'state': command.state.value,
             'fault': reason or 'none',
             'force [N]': f'{command.force:.6g}',
+            'torque [N·m]': f'{command.torque:.6g}',
             'work [J]': f'{core.work:.6g}',
             'messages refused': str(core.refused),
             'age of the last sample [s]': f'{age:.6g}' if math.isfinite(age) else 'nan',

@@ -56,6 +56,13 @@ class HoldLaw:
             self.force = self._answer(last)
         return self.force
 
+    def wanted(self, now: float) -> float:
+        """The force [N] to be commanded at a time; NaN before the first strike."""
+        return self.force
+
+    def act(self, now: float, force: float) -> None:
+        """Note what was commanded: nothing here depends on it."""
+
     def _answer(self, last: PhaseSample) -> float:
         """The force that answers the strike after a sample."""
         omega1, omega2 = last.front.rate, last.rear.rate

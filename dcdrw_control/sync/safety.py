@@ -36,17 +36,29 @@ class Limits(NamedTuple):
     """What no command ever exceeds."""
 
     max_force: Annotated[float, Quantity('largest force', 'N', above=0.0, high=1e4, live=True)] = 20.0
-    max_slew: Annotated[float, Quantity('fastest change of the force', 'N/s', above=0.0, high=1e6, live=True)] = 2000.0
+    max_torque: Annotated[float, Quantity('largest torque on the rear hub', 'N·m', above=0.0, high=1e4, live=True)] = (
+        20.0
+    )
+    max_slew: Annotated[
+        float, Quantity('fastest change of force or torque', 'N/s or N·m/s', above=0.0, high=1e6, live=True)
+    ] = 2000.0
     max_power: Annotated[
-        float, Quantity('largest power into or out of the coupler, |F Ḋ|', 'W', above=0.0, high=1e4, live=True)
+        float,
+        Quantity(
+            'largest power into or out of the coupler, |F Ḋ|, or the rear hub', 'W', above=0.0, high=1e4, live=True
+        ),
     ] = 20.0
 
 
 class Safety:
-    """The state, and the force that may be commanded in it. Time is a steady clock's [s]."""
+    """The state, and the force that may be commanded in it. Time is a steady clock's [s].
 
-    def __init__(self, limits: Limits) -> None:
+    Where the rear hub is driven, force is to be read as torque, N as N·m, and m/s as rad/s.
+    """
+
+    def __init__(self, limits: Limits, drives_hub: bool = False) -> None:
         self.limits = limits
+        self._drives_hub = drives_hub
         self.state = State.DISABLED
         self.reason: Fault | None = None
         """Why the state is `fault`; None where it is not."""
@@ -103,7 +115,8 @@ class Safety:
         """
         elapsed = min(max(now - self._now, 0.0), 1.0) if math.isfinite(self._now) else 0.0
         self._now = max(now, self._now)
-        most, slew = self.limits.max_force, self.limits.max_slew
+        most = self.limits.max_torque if self._drives_hub else self.limits.max_force
+        slew = self.limits.max_slew
         if self.state is State.ACTIVE and math.isfinite(wanted):
             if rate:  # NaN fails the comparison below
                 power = self.limits.max_power / abs(rate)

@@ -4,12 +4,13 @@ import math
 from typing import Annotated, Literal, NamedTuple, get_args
 
 from dcdrw_control.sync.hold import HoldGains, HoldLaw
+from dcdrw_control.sync.rear import HubGains, RearLaw
 from dcdrw_control.sync.safety import Fault, Limits, Safety, State
 from dcdrw_msgs_py.quantity import Quantity
 from dcdrw_msgs_py.rig import StanceDistance, WheelShape
 from dcdrw_msgs_py.samples import PhaseSample
 
-LawName = Literal['off', 'hold']
+LawName = Literal['off', 'hold', 'rear']
 LAWS: tuple[LawName, ...] = get_args(LawName)
 MOST_STEPS_APART = 1
 """|n| beyond this is a slipped step."""
@@ -18,8 +19,9 @@ MOST_STEPS_APART = 1
 class SynchronizerParams(NamedTuple):
     """The rig as the synchronizer needs it, its law, its limits and its patience."""
 
-    law: Annotated[str, Quantity(f'what computes the force: {", ".join(LAWS)}')] = 'off'
+    law: Annotated[str, Quantity(f'what computes the force, or the torque: {", ".join(LAWS)}')] = 'off'
     hold: HoldGains = HoldGains()
+    hub: HubGains = HubGains()
     damping: Annotated[
         float,
         Quantity('damping that the force adds to the coupler, where its own would stall the pair', 'N·s/m', low=0.0),
@@ -50,13 +52,17 @@ class SynchronizerParams(NamedTuple):
             raise ValueError(f'law must be one of {", ".join(LAWS)}, got {self.law!r}')
         if self.law == 'hold':
             self.hold.check_sizes()
+        elif self.law == 'rear':
+            self.hub.check_sizes()
 
 
 class Command(NamedTuple):
     """What is commanded at one instant."""
 
     force: float
-    """[N], tension positive."""
+    """Of the coupler [N], tension positive."""
+    torque: float
+    """On the rear hub [N·m], positive where it rolls it downhill."""
     state: State
     stamp_ns: int
     """Of the sample that it came from; 0 where there was none."""
@@ -75,14 +81,17 @@ class Synchronizer:
 
     def __init__(self, params: SynchronizerParams) -> None:
         self.params = params
-        self.safety = Safety(params.limits)
-        self._law = HoldLaw(params.hold, params.front.alpha, params.rear.alpha)
+        self.drives_hub = params.law == 'rear'
+        """Whether it commands a torque on the rear hub, in the place of the coupler's force."""
+        self.safety = Safety(params.limits, self.drives_hub)
+        alphas = params.front.alpha, params.rear.alpha
+        self._law = RearLaw(params.hub, *alphas) if self.drives_hub else HoldLaw(params.hold, *alphas)
         self._heartbeat = -math.inf
         self._forget()
         self.refused = 0
         """Messages that could not be read, or that had no place."""
         self.work = 0.0
-        """Work on the pair so far, ∫ |F Ḋ| dt [J]."""
+        """Work on the pair so far, ∫ |F Ḋ| dt or ∫ |T θ2′| dt [J]."""
 
     def configure(self, params: SynchronizerParams) -> None:
         """Take changed limits at once."""
@@ -124,7 +133,8 @@ class Synchronizer:
             before = (last.front, last.rear)[i] if last else turn
             if abs(turn.angle - before.angle) > wheel.alpha or not math.isfinite(self._struck[i]):
                 self._struck[i] = now
-        self._law.update(sample)
+        if self.params.law != 'off':
+            self._law.update(sample)
         self._last, self._heard = sample, now
 
     def command(self, now: float) -> Command:
@@ -133,22 +143,28 @@ class Synchronizer:
             self.safety.trip('stale')
         if now - min(self._struck) > self.params.stall_after:
             self.safety.trip('stalled')
+        wanted = self._law.wanted(now)
         ready = (
             self.params.law != 'off'
             and now - self._heard <= self.params.stale_after
             and now - min(self._struck) <= self.params.stall_after
-            and math.isfinite(self._law.force)
+            and math.isfinite(wanted)
             and self._last is not None
             and abs(self._last.step_difference) <= MOST_STEPS_APART
         )
         state = self.safety.update(now, now - self._heartbeat <= self.params.enable_timeout, ready)
-        rate = self._coupler_rate()
-        damping = self.params.damping * rate if self.params.damping else 0.0
-        force = self.safety.command(now, self._law.force + damping, rate)
+        if self.drives_hub:
+            rate = self._last.rear.rate if self._last else math.nan
+        else:
+            rate = self._coupler_rate()
+            wanted += self.params.damping * rate if self.params.damping else 0.0
+        effort = self.safety.command(now, wanted, rate)
+        self._law.act(now, effort)
         if math.isfinite(self._asked) and math.isfinite(rate):
-            self.work += abs(force * rate) * (now - self._asked)
+            self.work += abs(effort * rate) * (now - self._asked)
         self._asked = now
-        return Command(force, state, self._last.stamp_ns if self._last else 0)
+        force, torque = (0.0, effort) if self.drives_hub else (effort, 0.0)
+        return Command(force, torque, state, self._last.stamp_ns if self._last else 0)
 
     def _forget(self) -> None:
         """Know nothing of the input any more."""

@@ -1,4 +1,4 @@
-"""The node `synchronizer`: phase in; a bounded force out, while somebody enables it."""
+"""The node `synchronizer`: phase in; a bounded force or torque out, while somebody enables it."""
 
 import math
 import sys
@@ -16,7 +16,14 @@ from dcdrw_control.sync.synchronizer import Command, Synchronizer, SynchronizerP
 from dcdrw_msgs_py.diagnosis import Diagnosis
 from dcdrw_msgs_py.messages import PhaseSampleReader, to_stamp
 from dcdrw_msgs_py.node import Parameters, advertise, listen, report, run, steady_clock
-from dcdrw_msgs_py.topics import COUPLER_FORCE_COMMAND, COUPLER_WRENCH, ENABLE, PHASE_STATE, SYNCHRONIZER_STATE
+from dcdrw_msgs_py.topics import (
+    COUPLER_FORCE_COMMAND,
+    COUPLER_WRENCH,
+    ENABLE,
+    PHASE_STATE,
+    REAR_TORQUE_COMMAND,
+    SYNCHRONIZER_STATE,
+)
 
 WATCH_SECONDS = 0.1
 """How often other publishers and the clock are looked at [s]."""
@@ -31,9 +38,9 @@ class SynchronizerNode(Node):
         self._core = Synchronizer(settings.value)
         self._reader = PhaseSampleReader()
         self._told: State | None = None
-        self._command = Command(0.0, State.DISABLED, 0)
+        self._command = Command(0.0, 0.0, State.DISABLED, 0)
         self._last_clock = 0
-        self._force = advertise(self, COUPLER_FORCE_COMMAND)
+        self._effort = advertise(self, REAR_TORQUE_COMMAND if self._core.drives_hub else COUPLER_FORCE_COMMAND)
         self._wrench = advertise(self, COUPLER_WRENCH)
         self._state = advertise(self, SYNCHRONIZER_STATE)
         self.create_service(Trigger, '~/stop', self._on_stop)
@@ -48,7 +55,7 @@ class SynchronizerNode(Node):
     def say_last_words(self) -> None:
         """Leave no force behind."""
         self._core.safety.stop()
-        self._publish(Command(0.0, State.DISABLED, self._command.stamp_ns))
+        self._publish(Command(0.0, 0.0, State.DISABLED, self._command.stamp_ns))
 
     def _configure(self, params: SynchronizerParams) -> None:
         self._core.configure(params)
@@ -67,10 +74,10 @@ class SynchronizerNode(Node):
 
     def _publish(self, command: Command) -> None:
         self._command = command
-        self._force.publish(Float64(data=command.force))
+        self._effort.publish(Float64(data=command.torque if self._core.drives_hub else command.force))
         wrench = WrenchStamped()
         wrench.header.stamp = to_stamp(command.stamp_ns)
-        wrench.wrench.force.x = command.force
+        wrench.wrench.force.x, wrench.wrench.torque.y = command.force, command.torque
         self._wrench.publish(wrench)
         if command.state is not self._told:
             self._told = command.state
@@ -80,7 +87,7 @@ class SynchronizerNode(Node):
 
     def _watch(self) -> None:
         """See what no sample tells."""
-        if self.count_publishers(self._force.topic_name) > 1:
+        if self.count_publishers(self._effort.topic_name) > 1:
             self._core.conflict('second publisher')
         now = self.get_clock().now().nanoseconds
         if now < self._last_clock:

@@ -87,7 +87,7 @@ class SimulatedRig:
         params = self.params
         rig, state = params.start(self._rig)
         self.simulation = Simulation(rig, state)
-        self._person = Person(params.person, rig, float(state.theta1), params.seed) if params.person.walks else None
+        self.person = Person(params.person, rig, float(state.theta1), params.seed) if params.person.walks else None
         self._servo_ticks = 0
 
     def configure(self, rig: RigParams) -> None:
@@ -146,13 +146,13 @@ class SimulatedRig:
 
     def prepare(self, t: float) -> None:
         """Do now the costly part of the way to a time [s] that is about to be read, as `Simulation.prepare`."""
-        self.simulation.prepare(min(t, self._servo_ticks * SERVO_SECONDS) if self._person else t)
+        self.simulation.prepare(min(t, self._servo_ticks * SERVO_SECONDS) if self.person else t)
 
     def _walk_to(self, t: float) -> None:
         """Sample the person's servo whenever it is due up to a time [s]."""
-        while self._person and (due := self._servo_ticks * SERVO_SECONDS) <= t:
+        while self.person and (due := self._servo_ticks * SERVO_SECONDS) <= t:
             motion = self.simulation.advance_to(due)
-            torque = self._person.torque(due, motion.rotation1, motion.omega1)
+            torque = self.person.torque(due, motion.rotation1, motion.omega1)
             self.simulation.torques = torque, self.rear_torque
             self._servo_ticks += 1
 
