@@ -115,20 +115,19 @@ class Safety:
         """
         elapsed = min(max(now - self._now, 0.0), 1.0) if math.isfinite(self._now) else 0.0
         self._now = max(now, self._now)
-        most = self.limits.max_torque if self._drives_hub else self.limits.max_force
+        full = most = self.limits.max_torque if self._drives_hub else self.limits.max_force
         slew = self.limits.max_slew
+        if rate:  # NaN fails the comparison below
+            power = self.limits.max_power / abs(rate)
+            most = power if power < full else full
         if self.state is State.ACTIVE and math.isfinite(wanted):
-            if rate:  # NaN fails the comparison below
-                power = self.limits.max_power / abs(rate)
-                most = power if power < most else most
             goal = max(-most, min(most, wanted))
             self.force += max(-slew * elapsed, min(slew * elapsed, goal - self.force))
-            self.force = max(-most, min(most, self.force))
         elif self.state in (State.ACTIVE, State.RAMP_DOWN):
-            step = most / RAMP_SECONDS * elapsed
-            self.force = math.copysign(max(abs(self.force) - step, 0.0), self.force)
+            self.force = math.copysign(max(abs(self.force) - full / RAMP_SECONDS * elapsed, 0.0), self.force)
         else:
             self.force = 0.0
+        self.force = max(-most, min(most, self.force))
         return self.force
 
     def _leave(self) -> None:
