@@ -11,12 +11,13 @@ import numpy as np
 
 from dcdrw.console import Bar, add_json, check_json, positive, tell, tell_where
 from dcdrw.drawings.design_card import draw_card
-from dcdrw.files import add_force, refuse_existing, to_json, write_text, write_whole
+from dcdrw.drawings.figure_files import add_formats, figure_files, write_figure
+from dcdrw.files import add_force, refuse_existing, to_json, write_text
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.text_file import read_rows
-from dcdrw_sim.figures.style import new_figure, save
+from dcdrw_sim.figures.style import new_figure
 from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.study.design import (
     CASES,
@@ -43,7 +44,6 @@ STIFFNESS = 1e-4, 1.0
 DAMPING = 1e-2, 1e2
 MOST_PARTS = 20_000
 """Pairs of parts that are judged in minutes."""
-CARDS = 'card.pdf', 'card.png'
 FASTEST, FORGIVING, GIVEN = 'fastest', 'most forgiving', 'given'
 
 _EPILOG = """\
@@ -95,7 +95,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='PERCENT',
         help="in step is within ± this of 50 %% (default: %(default)g, the monitor's)",
     )
-    parser.add_argument('--out', type=Path, metavar='DIR', help='write card.pdf, card.png and design.json there')
+    parser.add_argument('--out', type=Path, metavar='DIR', help='write the card and design.json there')
+    add_formats(parser, 'pdf', 'png')
     add_json(parser)
     add_force(parser)
 
@@ -116,7 +117,8 @@ def run(options: argparse.Namespace) -> int:
     check_json(options)
     if options.out:
         new_figure(1, 1, 'a card')
-        refuse_existing([options.out / name for name in ('design.json', *CARDS)], options.force)
+        files = figure_files(options.out, ['card'], options.formats)
+        refuse_existing([options.out / 'design.json', *files], options.force)
     with Bar('judging', 'couplers') as bar:
         k, b = _bounds(options, task.rig)
         if parts:
@@ -137,9 +139,7 @@ def run(options: argparse.Namespace) -> int:
         texts = _texts(task, chosen, parts, tolerance)
         on_sale = {kind: [part.value for part in _of(parts, kind)] for kind in ('spring', 'dashpot')}
         card = draw_card(_rig_line(task), texts, task, grid, chosen, on_sale)
-        for name in CARDS:
-            with write_whole(options.out / name, options.force) as unfinished:
-                save(card, unfinished)
+        write_figure(card, options.out, 'card', options.formats, options.force)
         tell_where(options, f'\nThe card and all numbers are in {options.out}.')
     return 0
 

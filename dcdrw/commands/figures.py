@@ -14,7 +14,7 @@ from dcdrw.console import Bar, cores
 from dcdrw.drawings.figure_files import add_formats, figure_files, write_figure
 from dcdrw.files import add_force, refuse_existing
 from dcdrw_sim.figures import model_figures, regime_figures, sweep_figures
-from dcdrw_sim.figures.style import new_figure
+from dcdrw_sim.figures.style import COLUMN, PAGE, for_print, new_figure
 from dcdrw_sim.map.return_map import ReturnMap
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.rig.simulator import SimulatorParams
@@ -96,14 +96,15 @@ def run(options: argparse.Namespace) -> int:
     book = Book(options.cache or _default_cache(), options.quick)
     book.cache.mkdir(parents=True, exist_ok=True)
     for name in names:
-        for path in write_figure(FIGURES[name](book), options.out, name, options.formats, options.force):
-            print(path)
+        with for_print():
+            paths = write_figure(FIGURES[name](book), options.out, name, options.formats, options.force)
+        print(*paths, sep='\n')
     return 0
 
 
 def _trajectories(book: Book) -> Any:
     """θ2 at the section of every start of every coupler that converges."""
-    figure = new_figure(8, 5)
+    figure = new_figure(COLUMN, 2.6)
     with book.sweep('paper', _paper(book)) as dataset:
         sweep_figures.draw_trajectories(figure.subplots(), dataset)
     return figure
@@ -113,7 +114,7 @@ def _eigenvalues(book: Book) -> Any:
     """Couplers that converge, with the largest eigenvalue: the paper's way, mended, and exact."""
     from matplotlib.colors import Normalize
 
-    figure = new_figure(12, 8.4)
+    figure = new_figure(PAGE, 5.4)
     rows = (('paper', PAPERS_SWEEP, 'D0 = S0 + ℓ sin α'), ('preloaded', PRELOADED, 'D0 = S0'))
     for line, (name, rig, title) in zip(figure.subplots(2, 3, sharex=True, sharey=True), rows, strict=True):
         with book.sweep(name, _paper(book)._replace(rig=rig)) as dataset:
@@ -127,7 +128,7 @@ def _eigenvalues(book: Book) -> Any:
 
 def _best(book: Book) -> Any:
     """The best coupler's motions, and what the regressions predict."""
-    figure = new_figure(12, 4.6)
+    figure = new_figure(PAGE, 3.0)
     with book.sweep('paper', _paper(book)) as dataset:
         for axes, form in zip(figure.subplots(1, 2, sharex=True, sharey=True), ('raw', 'affine'), strict=True):
             sweep_figures.draw_best(axes, dataset, form)
@@ -137,7 +138,7 @@ def _best(book: Book) -> Any:
 
 def _experiment(book: Book) -> Any:
     """The paper's experiment in simulation: 5 s from 21.6 %."""
-    figure = new_figure(8, 5.5)
+    figure = new_figure(COLUMN, 3.6)
     rig, start = SimulatorParams().start(PAPERS_RIG)
     angles, phase = figure.subplots(2, 1, sharex=True)
     sweep_figures.draw_experiment(angles, phase, rig, start, EXPERIMENT_SECONDS, EXPERIMENT_BAND)
@@ -147,16 +148,16 @@ def _experiment(book: Book) -> Any:
 
 def _regimes(book: Book) -> Any:
     """What becomes of a pair over stiffness and damping, and over slope and damping."""
-    figure = new_figure(14, 6.4)
-    coupler, preloaded, slope = figure.subplots(1, 3)
+    figure = new_figure(PAGE, 4.5)
+    (coupler, preloaded, slope), rooms = figure.subplots(2, 3, height_ratios=(3.0, 2.1))
     for axes, name, rig, title in (
-        (coupler, 'paper-long', PAPERS_SWEEP, 'D0 = S0 + ℓ sin α: at rest at φ = α'),
+        (coupler, 'paper-long', PAPERS_SWEEP, 'D0 = S0 + ℓ sin α: no preload'),
         (preloaded, 'preloaded-long', PRELOADED, 'D0 = S0: preloaded'),
     ):
         sweep = _paper(book, LONG_POINTS)._replace(rig=rig, seconds=LONG, trajectories=False)
         with book.sweep(name, sweep) as dataset:
             regime_figures.draw_coupler_regimes(axes, dataset, papers_sweep().seconds)
-        axes.set_title(title, fontsize=10)
+        axes.set_title(title)
     points = book.points(LONG_POINTS)
     sweep = papers_sweep()._replace(
         x=Axis('slope_deg', tuple(np.linspace(*SLOPES, points).tolist())),
@@ -166,15 +167,19 @@ def _regimes(book: Book) -> Any:
     )
     with book.sweep('slopes', sweep) as dataset:
         regime_figures.draw_slope_regimes(slope, dataset)
-    slope.set_title(f'k̂ = {PAPERS_SWEEP.k:g}', fontsize=10)
-    for axes in (preloaded, slope):
-        regime_figures.label_regimes(axes, loc='upper center', bbox_to_anchor=(0.5, -0.12), frameon=False)
+    slope.set_title(f'k̂ = {PAPERS_SWEEP.k:g}')
+    for room in rooms:
+        room.set_axis_off()
+    regime_figures.label_regimes(preloaded, rooms[0], loc='upper left', frameon=False)
+    regime_figures.label_regimes(slope, rooms[2], loc='upper right', frameon=False)
+    for room in (rooms[0], rooms[2]):
+        room.get_legend().set_in_layout(False)  # wider than its axes, beside which there is room
     return figure
 
 
 def _basin(book: Book) -> Any:
     """From which phases and speeds a pair comes into step, with a coupler on either side of the stall band."""
-    figure = new_figure(12, 4.8)
+    figure = new_figure(PAGE, 3.2)
     points = book.points(100)
     for axes, (k, b) in zip(figure.subplots(1, 2, sharey=True), BASINS, strict=True):
         rig = PAPERS_SWEEP._replace(k=k, b=b)
@@ -188,7 +193,7 @@ def _basin(book: Book) -> Any:
 
 def _pair(book: Book) -> Any:
     """Mean speed and energy lost per metre against the phase, of the pair with a rigid bar."""
-    figure = new_figure(12, 4.8)
+    figure = new_figure(PAGE, 3.2)
     speed, energy = figure.subplots(1, 2)
     rig, cycle = PAPERS_RIG.resolved(), ReturnMap(PAPERS_RIG)
     fixed = cycle.fixed_point()

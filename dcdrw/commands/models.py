@@ -13,7 +13,7 @@ from dcdrw.suite.parameter_file import add_rig_options, chosen_params
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelParams
 from dcdrw_sim.figures import model_figures
-from dcdrw_sim.figures.style import new_figure
+from dcdrw_sim.figures.style import PAGE, for_print, new_figure
 from dcdrw_sim.map.return_map import ReturnMap
 from dcdrw_sim.model.wheel import gentlest_slope, limit_cycle_speed
 from dcdrw_sim.relatives import rigid_pair, rimless_wheel
@@ -58,8 +58,9 @@ def run(options: argparse.Namespace) -> int:
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
         write_text(options.out / 'models.json', to_json(found), options.force)
-        for name, figure in draw(rig, found).items():
-            write_figure(figure, options.out, name, options.formats, options.force)
+        with for_print():
+            for name, figure in draw(rig, found).items():
+                write_figure(figure, options.out, name, options.formats, options.force)
         tell_where(options, f'numbers and pictures are in {options.out}')
     return 0
 
@@ -228,7 +229,7 @@ def draw(rig: RigParams, found: dict[str, Any]) -> dict[str, Any]:
     """
     wheels = {FRONT: rig.front} if rig.front == rig.rear else {FRONT: rig.front, REAR: rig.rear}
     drawn = {}
-    drawn['wheel'] = figure = new_figure(11, 5 * len(wheels))
+    drawn['wheel'] = figure = new_figure(PAGE, 3.2 * len(wheels))
     for (name, wheel), (basin, speed) in zip(
         wheels.items(), figure.subplots(len(wheels), 2, squeeze=False), strict=True
     ):
@@ -236,12 +237,12 @@ def draw(rig: RigParams, found: dict[str, Any]) -> dict[str, Any]:
         model_figures.draw_wheel_speed(speed, wheel, rig.slope, rig.gravity)
         speed.set_title('a single wheel' if len(wheels) == 1 else f'the {name} wheel by itself')
     if 'fastest' in found['rigid_pair']:
-        drawn['pair'] = figure = new_figure(11, 4.6)
+        drawn['pair'] = figure = new_figure(PAGE, 3.0)
         speed, energy = figure.subplots(1, 2)
         coupled = found['coupled_pair']
         model_figures.draw_speed(speed, rig, (coupled['phase'], coupled['velocity']) if coupled.get('stable') else None)
         model_figures.draw_energy(energy, rig)
-    drawn['footfalls'] = figure = new_figure(11, 6)
+    drawn['footfalls'] = figure = new_figure(PAGE, 4.0)
     for axes, phase in zip(figure.subplots(2, 2, sharex=True, sharey=True).flat, GAITS, strict=True):
         model_figures.draw_hildebrand(axes, steady_contacts(phase, 2), title=f'p = {100 * phase:.0f} %')
         axes.set_xlim(0.0, 2.0)

@@ -61,7 +61,7 @@ def _write(axes: Any, lines: dict[str, str]) -> None:
             text,
             transform=axes.transAxes,
             va='top',
-            fontsize=7.4,
+            fontsize=8,
             linespacing=1.25,
             bbox={'facecolor': 'none', 'edgecolor': colour, 'linewidth': 1.2, 'pad': 4.0},
         )
@@ -149,7 +149,7 @@ def _draw_sensitivity(axes: Any, chosen: dict[str, Assessment]) -> None:
                     rotation=90,
                     ha='center',
                     va='bottom',
-                    fontsize=7,
+                    fontsize=8,
                     color=colour,
                 )
             else:

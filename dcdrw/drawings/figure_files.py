@@ -9,15 +9,16 @@ from dcdrw.files import write_whole
 from dcdrw_sim.figures.style import FORMATS, save
 
 
-def add_formats(parser: argparse.ArgumentParser) -> None:
-    """Add the option that chooses the formats of figures."""
+def add_formats(parser: argparse.ArgumentParser, *default: str) -> None:
+    """Add the option that chooses the formats of figures, by default png."""
+    default = default or ('png',)
     parser.add_argument(
         '--format',
         dest='formats',
         type=formats,
-        default=('png',),
+        default=default,
         metavar='png,pdf,svg',
-        help='of figures; several, separated by commas (default: png)',
+        help=f'of figures; several, separated by commas (default: {",".join(default)})',
     )
 
 

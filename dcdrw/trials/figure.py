@@ -11,10 +11,12 @@ import numpy as np
 from dcdrw.trials.analysis import Analysis, Floats, Motion
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND
-from dcdrw_sim.figures.style import BAND, BLACK, WHEELS, new_figure, save
+from dcdrw_sim.figures.style import BAND, BLACK, COLUMN, WHEELS, for_print, new_figure, save
 
-TITLE_WIDTH = 100
-"""Of a line of the title [characters]."""
+SCREEN = 10.0
+"""Width on a screen [inch]."""
+LETTERS = 15
+"""Of a title's line, in an inch of letters of POINTS."""
 _FORCE = '#555555'
 
 
@@ -25,11 +27,17 @@ def draw_trial(trial: Analysis, title: str, path: Path) -> None:
         ValueError: matplotlib is not installed.
 
     """
-    save(trial_figure(trial, title), path)
+    with for_print():
+        save(trial_figure(trial, title, COLUMN), path)
 
 
-def trial_figure(trial: Analysis, title: str) -> Any:
+def trial_figure(trial: Analysis, title: str, width: float = SCREEN) -> Any:
     """The picture. Where samples are missing, curves and stances break and footfalls are left out.
+
+    Args:
+        trial: what to draw.
+        title: above it.
+        width: of the picture [inch].
 
     Raises:
         ValueError: as `draw_trial`.
@@ -37,7 +45,9 @@ def trial_figure(trial: Analysis, title: str) -> Any:
     """
     course = _Course.of(trial)
     force_known = bool(np.isfinite(course.motion.coupler_force).any())
-    figure = new_figure(10, 9 if force_known else 7.4)
+    title = _in_lines(title, width)
+    height = 3.3 + 0.57 * width if force_known else 2.8 + 0.46 * width
+    figure = new_figure(width, height + 0.16 * (title.count('\n') + 1))
     panels = 4 if force_known else 3
     angles, phase, gait, *force = figure.subplots(panels, 1, sharex=True, height_ratios=(3, 3, 1.3, 2)[:panels])
     _draw_angles(angles, course)
@@ -52,7 +62,7 @@ def trial_figure(trial: Analysis, title: str) -> Any:
     for axes in (angles, phase, gait, *force):
         axes.spines[['top', 'right']].set_visible(False)
         _shade_gaps(axes, course)
-    figure.suptitle(_in_lines(title))
+    figure.suptitle(title)
     figure.align_ylabels()
     return figure
 
@@ -95,9 +105,9 @@ class _Course(NamedTuple):
         return [(second, steps) for second, steps in falls if any(begin <= second <= end for begin, end in self.pieces)]
 
 
-def _in_lines(title: str) -> str:
-    """Lines of about one length."""
-    lines = len(title) // TITLE_WIDTH + 1
+def _in_lines(title: str, width: float) -> str:
+    """Lines of about one length, that fit into a picture of this width [inch]."""
+    lines = len(title) // int(LETTERS * width) + 1
     return '\n'.join(wrap(title, max(len(title) // lines + 10, 1)))
 
 

@@ -196,11 +196,11 @@ def draw_hildebrand(axes: Any, contacts: Sequence[Contact], unit: str = 'stride'
             linewidth=0.8,
             hatch='' if left else '///',
         )
-        axes.text(contact.start, y + 0.34, f' {contact.foot}', va='bottom', ha='left', fontsize=9, clip_on=True)
+        axes.text(contact.start, y + 0.34, f' {contact.foot}', va='bottom', ha='left', clip_on=True)
     axes.set_yticks(range(4), [f'{FEET[foot]} {foot}' for foot in rows])
     axes.set_ylim(-0.5, 3.75)
     axes.set_xlabel(f'time [{unit}]')
-    axes.set_title('   '.join(filter(None, (title, order(contacts)))), fontsize=11)
+    axes.set_title('   '.join(filter(None, (title, order(contacts)))))
 
 
 def _cost(rig: RigParams, phase: float, velocity: float) -> float:
@@ -212,4 +212,4 @@ def _phase_axis(axes: Any) -> None:
     axes.set_xlim(0.0, 100.0)
     axes.set_xticks(range(0, 101, 25))
     axes.set_xlabel('phase p [% of a step]; half of it in % of a stride')
-    axes.legend(loc='best', frameon=False)
+    axes.legend(loc='lower center', bbox_to_anchor=(0.5, 1.0), frameon=False)

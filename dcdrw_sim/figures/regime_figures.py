@@ -143,16 +143,16 @@ def draw_basin(axes: Any, rig: RigParams, basin: Basin, edge: tuple[Floats, Floa
     axes.set_xlabel('phase at the start [% of a step]')
     axes.set_ylabel('speed of both wheels at the start\n[% of their uncoupled limit cycles]')
     plain = nondimensional(rig)[0]
-    axes.set_title(f'k̂ = {plain.k:.3g}, b̂ = {plain.b:.3g}', fontsize=10)
+    axes.set_title(f'k̂ = {plain.k:.3g}, b̂ = {plain.b:.3g}')
     axes.legend(loc='upper right', framealpha=1.0, edgecolor='none')
     return mesh
 
 
-def label_regimes(axes: Any, **where: Any) -> None:
-    """A legend of the regimes and of the lines drawn."""
+def label_regimes(axes: Any, room: Any = None, **where: Any) -> None:
+    """A legend of the regimes and of the lines drawn; in the axes `room`, where they are given."""
     for name, colour, _ in REGIMES:
-        axes.plot([], [], 's', color=colour, markersize=10, markeredgecolor='0.4', label=name)
-    axes.legend(**where)
+        axes.plot([], [], 's', color=colour, markersize=7, markeredgecolor='0.4', label=name)
+    (room or axes).legend(*axes.get_legend_handles_labels(), **where)
 
 
 def _draw_regimes(axes: Any, x: Any, y: Any, verdicts: NDArray[np.int8]) -> None:

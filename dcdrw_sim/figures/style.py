@@ -1,5 +1,7 @@
 """What all pictures share: a figure without a window, the colours, and how it is saved."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,24 @@ WHEELS = {FRONT: BLUE, REAR: VERMILION}
 BAND = GREEN
 """Of what is in step."""
 FORMATS = 'png', 'pdf', 'svg'
+COLUMN, PAGE = 3.5, 7.2
+"""Width of a journal's column and of its page [inch]."""
+POINTS = 8
+"""Of letters in print."""
+_PRINT = {
+    **{f'{what}.labelsize': POINTS for what in ('axes', 'xtick', 'ytick')},
+    **{f'{what}.titlesize': POINTS for what in ('axes', 'figure')},
+    'font.size': POINTS,
+    'legend.fontsize': POINTS,
+    'legend.columnspacing': 0.9,
+    'legend.handlelength': 1.3,
+    'legend.handletextpad': 0.5,
+    'axes.linewidth': 0.6,
+    'lines.linewidth': 1.0,
+    'lines.markersize': 4,
+    'xtick.major.width': 0.6,
+    'ytick.major.width': 0.6,
+}
 
 
 def new_figure(width: float, height: float, what: str = 'a picture') -> Any:
@@ -31,9 +51,24 @@ def new_figure(width: float, height: float, what: str = 'a picture') -> Any:
     return figure
 
 
+@contextmanager
+def for_print() -> Iterator[None]:
+    """What is drawn within has letters to be read at the size that it is drawn at.
+
+    Raises:
+        ValueError: matplotlib is not installed.
+
+    """
+    new_figure(1, 1)  # tells where it is missing
+    from matplotlib import rc_context
+
+    with rc_context(_PRINT):
+        yield
+
+
 def save(figure: Any, path: Path) -> None:
     """Save a figure as PNG, PDF or SVG, by the ending of the name; words stay words, that they can be edited."""
     from matplotlib import rc_context
 
     with rc_context({'pdf.fonttype': 42, 'svg.fonttype': 'none'}):
-        figure.savefig(path, dpi=160)
+        figure.savefig(path, dpi=300)

@@ -93,7 +93,7 @@ def draw_eigenvalues(axes: Any, dataset: Any, name: str, norm: Any) -> Any:
     axes.contourf(dataset.k, dataset.b, stalls.T.astype(float), levels=[0.5, 1.5], colors='none', hatches=['///'])
     axes.set_facecolor('0.93')
     span = f'{moduli[shown].min():.4f} to {moduli[shown].max():.4f}' if shown.any() else 'no coupler is valid'
-    axes.set_title(f'{EIGENVALUES[name]}\n{span}', fontsize=10)
+    axes.set_title(f'{EIGENVALUES[name]}\n{span}')
     label_coupler_axes(axes, dataset)
     return mesh
 
@@ -128,9 +128,8 @@ def draw_best(axes: Any, dataset: Any, form: str) -> Regression:
     axes.set_title(
         f'k̂ = {best.k:.3g}, b̂ = {best.b:.3g}: eigenvalue {abs(found.eigenvalues[0]):.4f}, '
         f'multiplier {best.multiplier:.4f}',
-        fontsize=10,
     )
-    axes.legend(loc='upper right', frameon=False)
+    axes.legend(loc='upper right', framealpha=0.9, edgecolor='none')
     return found
 
 

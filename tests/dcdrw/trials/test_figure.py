@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 from dcdrw.suite.parameter_file import TrialParams
 from dcdrw.trials.analysis import analyze
-from dcdrw.trials.figure import draw_trial, trial_figure
+from dcdrw.trials.figure import SCREEN, draw_trial, trial_figure
+from dcdrw_sim.figures.style import COLUMN, POINTS, for_print
 from tests.tracker.walking import walk
 from tests.trials import batch
 
@@ -57,13 +59,22 @@ def test_a_source_without_force_has_no_empty_panel():
 
 
 @pytest.mark.parametrize('samples', [WALK[:600], WALK, without(0.5, 11.0)], ids=['3 s', '12 s', 'mostly gap'])
-def test_no_text_covers_another(samples):
+@pytest.mark.parametrize('force', [1.0, np.nan], ids=['force', 'no force'])
+@pytest.mark.parametrize('width', [SCREEN, COLUMN], ids=['screen', 'column'])
+def test_no_text_covers_another(samples, force, width):
     long = 'From 21.6 % to within ±6 % of 50 % of a step (25 % of a stride) in 9 steps. ' * 4
-    drawn = figure(samples, title=long)
+    with for_print():
+        drawn = trial_figure(analyze([batch(samples, force)], TrialParams()), long, width)
     drawn.draw_without_rendering()
-    texts = [drawn._suptitle, *(axes.get_legend() for axes in drawn.axes if axes.get_legend())]
+    texts = [
+        drawn._suptitle,
+        *(axes.get_legend() for axes in drawn.axes if axes.get_legend()),
+        *(axes.yaxis.label for axes in drawn.axes),
+        drawn.axes[-1].xaxis.label,
+    ]
     boxes = [text.get_window_extent() for text in texts]
     boxes += [axes.get_window_extent() for axes in drawn.axes]
+    assert min(text.get_fontsize() for text in drawn.findobj(Text) if text.get_text()) >= POINTS
     for i, one in enumerate(boxes):
         assert drawn.bbox.x0 <= one.x0 <= one.x1 <= drawn.bbox.x1
         assert not any(one.shrunk(0.98, 0.98).overlaps(other.shrunk(0.98, 0.98)) for other in boxes[i + 1 :])
