@@ -23,6 +23,7 @@ COMMANDS = {
     'figures': Command('figures', "the paper's simulated figures, and what explains them"),
     'regimes': Command('regimes', 'whether a pair walks in step, and how far it is from stalling'),
     'map': Command('return_map', 'multipliers and regressions of the return map'),
+    'control': Command('control', 'gains of the active synchronizer, and where its loop is unstable'),
     'models': Command('models', 'the single wheel and the rigidly coupled pair, to compare with'),
     'simulate': Command('simulate', 'integrate cases from a JSON file'),
     'urdf': Command('urdf', 'the rig as a URDF, for RViz and Foxglove'),
@@ -41,6 +42,7 @@ examples:
   dcdrw report trials/* --out today.html  a day of trials on one page
   dcdrw design --slope-deg 2.5            which spring and dashpot to buy
   dcdrw map --rig my_rig.yaml             how fast the pair falls into step: multipliers of the return map
+  dcdrw control --rig my_rig.yaml --out gains.yaml   gains of the active synchronizer
   dcdrw sweep --out paper.nc              which couplers synchronize, and how fast: the paper's 50 × 50
   dcdrw regimes --rig my_rig.yaml         whether it walks in step at all, and how far it is from stalling
   dcdrw figures --out figures             the paper's simulated figures, and what explains them
