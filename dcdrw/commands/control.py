@@ -17,8 +17,8 @@ from dcdrw_sim.map.holding import METHODS, TARGETS, Law, Margins, Plant, law, ma
 from dcdrw_tracker.gait.sync import SyncParams
 
 _EPILOG = """\
-The law holds a force from strike to strike of the front wheel: u = force - gain (x - state) - gain_before u_before, with
-x = [θ1', θ2, θ2'] at the strike. Its gain comes from the exact derivative of the return map by the force. deadbeat
+The law holds a force from strike to strike of the front wheel: u = force - gain (x - state) - gain_before u_before,
+with x = [θ1', θ2, θ2'] at the strike. Its gain comes from the exact derivative of the return map by the force. deadbeat
 brings θ2 home in one step; lqr weighs the error against the force.
 
 example:

@@ -42,7 +42,7 @@ def test_coupler_and_slope_may_change_while_a_node_runs_and_the_wheels_may_not()
     [
         (RigParams(WheelParams(spokes=3)), r'front\.spokes must be ≥ 4'),
         (RigParams(WheelParams(length=math.nan)), r'front\.length must be > 0 m'),
-        (RigParams(b=-0.1), 'b must be ≥ 0 N·s/m'),
+        (RigParams(b=-0.1), 'b must be ≥ 0, ≤ 1e+06 N·s/m'),
         (RigParams(slope=1.0), 'slope must be ≥ -0.785398, ≤ 0.785398 rad'),
         (RigParams(D0=-1.0), 'D0 must be ≥ 0 m'),
     ],
