@@ -20,6 +20,7 @@ EXECUTABLES = {
     'synchronizer': 'dcdrw_control.sync.synchronizer_node',
     'rig_markers': 'dcdrw.nodes.rig_markers_node',
     'recorder': 'dcdrw.nodes.recorder_node',
+    'suite': 'dcdrw.nodes.suite',
 }
 """The command and the nodes, each with the module whose `main` it runs."""
 

@@ -141,6 +141,34 @@ def message_type(topic: Topic) -> Any:
     return getattr(import_module(f'{package}.{kind}'), name)
 
 
+_handed_over: dict[str, list[Callable[[Any], None]]] | None = None
+"""Where several nodes share this process: each topic that one of them publishes, and who of the others listens."""
+
+
+class Outlet:
+    """A publisher that hands its messages to the nodes of this process, and to DDS while somebody else listens."""
+
+    def __init__(self, publisher: Any, listeners: list[Callable[[Any], None]]) -> None:
+        self._publisher, self._listeners = publisher, listeners
+
+    def publish(self, message: Any) -> None:
+        """Publish a message."""
+        if self._publisher.get_subscription_count():
+            self._publisher.publish(message)
+        for listener in self._listeners:
+            listener(message)
+
+    def __getattr__(self, name: str) -> Any:
+        """All else is the publisher's."""
+        return getattr(self._publisher, name)
+
+
+def share_process() -> None:
+    """From now on, nodes made in this process hand samples to those made after them directly, without DDS."""
+    global _handed_over
+    _handed_over = {}
+
+
 def advertise(node: Node, topic: Topic) -> Any:
     """Publish a topic: reliably, and latched where it is declared so."""
     durability = DurabilityPolicy.TRANSIENT_LOCAL if topic.latched else DurabilityPolicy.VOLATILE
@@ -186,13 +214,18 @@ class Inbox:
 def listen(node: Node, topic: Topic, callback: Callable[[Any], None], depth: int = SAMPLE_DEPTH) -> Any:
     """Subscribe so that reliable and best-effort publishers both match; to a latched topic, as it is published.
 
-    Where the node cannot keep up, an `Inbox` drops what is old; `report` tells of it.
+    Where the node cannot keep up, an `Inbox` drops what is old; `report` tells of it. In a shared process, what another
+    node of it publishes is handed over, and heard from nobody else; there is no subscription then.
     """
     if topic.latched:
         qos = QoSProfile(
             depth=topic.depth, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
         )
         return node.create_subscription(message_type(topic), topic.name, callback, qos)
+    name = node.resolve_topic_name(topic.name)
+    if _handed_over is not None and name in _handed_over:
+        _handed_over[name].append(callback)
+        return None
     qos = QoSProfile(depth=max(topic.depth, depth), reliability=ReliabilityPolicy.BEST_EFFORT)
     return node.create_subscription(message_type(topic), topic.name, Inbox(callback).__call__, qos)
 
@@ -255,9 +288,10 @@ class Age:
         return time.monotonic() - self._at
 
 
-def _warn_of_unknown(node: Node, arguments: list[str]) -> None:
-    """Warn of parameters on the command line (-p NAME:=VALUE) that the node does not have."""
-    known = [parameter.name for parameter in node.get_parameters_by_prefix('').values()]
+def _warn_of_unknown(nodes: list[Node], arguments: list[str]) -> None:
+    """Warn of parameters on the command line (-p NAME:=VALUE) that no node has."""
+    node = nodes[0]
+    known = [parameter.name for each in nodes for parameter in each.get_parameters_by_prefix('').values()]
     for flag, value in pairwise(arguments):
         name = value.split(':=')[0].split(':')[-1]
         if flag in ('-p', '--param') and ':=' in value and name not in known:
@@ -275,7 +309,12 @@ class HasLastWords(Protocol):
 
 
 def run(name: str, make_node: Callable[[], Node], args: list[str] | None = None) -> int:
-    """Run one node until SIGINT, SIGTERM or shutdown; returns the process's exit status.
+    """Run one node until SIGINT, SIGTERM or shutdown; returns the process's exit status: as `run_all`."""
+    return run_all(name, lambda: [make_node()], args)
+
+
+def run_all(name: str, make_nodes: Callable[[], list[Node]], args: list[str] | None = None) -> int:
+    """Run nodes until SIGINT, SIGTERM or shutdown; returns the process's exit status.
 
     An impossible parameter or argument ends it with one line and status 2.
     """
@@ -293,25 +332,28 @@ def run(name: str, make_node: Callable[[], Node], args: list[str] | None = None)
         signal.signal(number, stop)
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        node = make_node()
+        nodes = make_nodes()
     except (ValueError, RuntimeError, InvalidParameterTypeException, InvalidParameterValueException) as error:
         print(f'{name}: {error}', file=sys.stderr)
         rclpy.try_shutdown()
         return 2
-    _warn_of_unknown(node, sys.argv if args is None else args)
+    _warn_of_unknown(nodes, sys.argv if args is None else args)
     executor = StreamExecutor()
-    executor.add_node(node)
+    for node in nodes:
+        executor.add_node(node)
     gc.freeze()  # what exists now stays: collections that come need not look at it
     with suppress(ExternalShutdownException):
         while not stopped and rclpy.ok():
             executor.spin_once(timeout_sec=SPIN_SECONDS)
     # A thread without Python ends what hangs: DDS may hold the interpreter.
     faulthandler.dump_traceback_later(END_SECONDS, exit=True, file=open(os.devnull, 'w'))  # noqa: SIM115
-    if isinstance(node, HasLastWords):
-        node.say_last_words()
+    for node in nodes:
+        if isinstance(node, HasLastWords):
+            node.say_last_words()
     # In this order, so that no thread of DDS outlives what it works on: neither waits for Python's own end.
     executor.shutdown()
-    node.destroy_node()
+    for node in nodes:
+        node.destroy_node()
     rclpy.try_shutdown()
     for number in (signal.SIGINT, signal.SIGTERM):  # Python itself ends now, and would die of a second signal
         signal.signal(number, signal.SIG_IGN)

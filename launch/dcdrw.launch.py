@@ -45,6 +45,11 @@ ARGUMENTS = {
     'record': ('false', 'record all topics of the suite', SWITCH),
     'folder': ('', 'of what is recorded (default: recordings/DATE-TIME)', None),
     'live': ('false', 'serve the page of `dcdrw live`; its button starts the recorder', SWITCH),
+    'one_process': (
+        'false',
+        'estimator, monitor and synchronizer in one process, which costs less; the synchronizer stays idle until enabled',
+        SWITCH,
+    ),
     'markers': ('false', 'draw the rig for RViz and Foxglove; rviz implies it', SWITCH),
     'rviz': ('false', 'show the rig in RViz, with its URDF in robot_state_publisher (needs both packages)', SWITCH),
 }
@@ -59,10 +64,17 @@ def _actions(context):
     simulated = source == 'recording' or (source == 'sim' and (on['simulated_time'] or bool(pace)))
 
     def node(name, **parameters):
+        return start(name, name, parameters)
+
+    def hosted():
+        """Several nodes in one process: each keeps its own name."""
+        return start('suite', None, {})
+
+    def start(executable, name, parameters):
         file = [chosen['params_file']] if chosen['params_file'] else []
         return Node(
             package='dcdrw',
-            executable=name,
+            executable=executable,
             name=name,
             namespace=chosen['namespace'],
             output='screen',
@@ -85,7 +97,7 @@ def _actions(context):
 
     # First what may not be installed: a launch that fails must not leave nodes behind.
     actions = _rviz(chosen, simulated) if on['rviz'] else []
-    actions += [node('sync_monitor'), node('phase_estimator')]
+    actions += [hosted()] if on['one_process'] else [node('sync_monitor'), node('phase_estimator')]
     if on['record'] or on['live']:
         actions.append(node('recorder', record=on['record'], **texts(folder='folder')))
     if on['markers'] or on['rviz']:

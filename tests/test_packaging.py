@@ -89,7 +89,7 @@ def test_each_executable_has_an_entry_point_and_a_script():
 
 
 def test_each_executable_has_a_declaration():
-    assert {'dcdrw', *(node.name for node in EXECUTABLES)} == COMMANDS
+    assert {'dcdrw', 'suite', *(node.name for node in EXECUTABLES)} == COMMANDS
 
 
 @pytest.fixture(scope='module')
