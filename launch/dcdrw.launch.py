@@ -47,7 +47,7 @@ ARGUMENTS = {
     'live': ('false', 'serve the page of `dcdrw live`; its button starts the recorder', SWITCH),
     'one_process': (
         'false',
-        'estimator, monitor and synchronizer in one process, which costs less; the synchronizer stays idle until enabled',
+        'estimator, monitor and synchronizer in one process; the synchronizer stays idle until enabled',
         SWITCH,
     ),
     'markers': ('false', 'draw the rig for RViz and Foxglove; rviz implies it', SWITCH),

@@ -82,6 +82,10 @@ def test_switches_add_their_tools(started):
     assert watched['commands'] == [['live', '--namespace', 'lab']]
 
 
+def test_one_process_takes_the_place_of_several(started):
+    assert set(started(one_process='true')['nodes']) == {'suite', 'simulator'}
+
+
 def test_a_recording_takes_the_place_of_the_simulator(started):
     running = started(source='recording', recording='day/7', real_time_factor='2')
     assert set(running['nodes']) == CORE
