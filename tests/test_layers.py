@@ -24,6 +24,7 @@ KNOW_ROS = {
     'dcdrw_msgs_py.messages',
     'dcdrw_msgs_py.image_messages',
     'dcdrw.nodes.observer',
+    'dcdrw.nodes.suite',
 }
 MODULES = [
     '.'.join(path.relative_to(ROOT).with_suffix('').parts)
