@@ -32,8 +32,8 @@ export function showControls(news) {
   press('pause', simulated && board.paused, 'Go on', 'Pause');
   press('record', recorder && board.recording, '■ Stop recording', '● Record');
   const hints = [];
-  if (board && !simulated) hints.push('No simulator runs here: sliders, reset and pause act on the simulated rig alone.');
-  if (board && !recorder) hints.push('No recorder runs here: start the node recorder to record.');
+  if (board && !board.unknown && !simulated) hints.push('No simulator runs here: sliders, reset and pause act on the simulated rig alone.');
+  if (board && !board.unknown && !recorder) hints.push('No recorder runs here: start the node recorder to record.');
   const text = hints.join(' ');
   if (element('hint').textContent !== text) element('hint').textContent = text;
 }

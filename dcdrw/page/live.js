@@ -115,7 +115,7 @@ function watch() {
     if (board) showControls(board);
   } else {
     showState(LATE_PAGE, 'this page hears nothing of dcdrw live; trying again …');
-    showControls(board && { ...board, simulated: false, recorder: false });
+    showControls(board && { ...board, simulated: false, recorder: false, unknown: true });
   }
   showAge();
   showFigures(frame && frame.rig);

@@ -243,6 +243,7 @@ def test_page_outlives_nodes_servers_and_sleep(bench, live, chromium):
     assert tab.value(OLD)
     assert 'hears nothing of dcdrw live' in text(tab, 'detail')
     assert tab.value("document.getElementById('reset').disabled")
+    assert text(tab, 'hint') == '', 'nobody knows what runs'
     live.start()
     for one in (tab, phone):
         one.wait(f'!{OLD}')
