@@ -1,10 +1,8 @@
 """What the synchronizer says of itself on `/diagnostics`."""
 
-import math
-
 from dcdrw_control.sync.safety import Fault, State
 from dcdrw_control.sync.synchronizer import Command, Synchronizer
-from dcdrw_msgs_py.diagnosis import Diagnosis, Level
+from dcdrw_msgs_py.diagnosis import AGE, STATE, Diagnosis, Level
 
 _MEANINGS: dict[Fault, str] = {
     'stale': 'phase_state has stopped',
@@ -29,12 +27,12 @@ def diagnose_synchronizer(core: Synchronizer, command: Command, age: float) -> D
         level,
         message,
         {
-            'state': command.state.value,
+            STATE: command.state,
             'fault': reason or 'none',
-            'force [N]': f'{command.force:.6g}',
-            'torque [N·m]': f'{command.torque:.6g}',
-            'work [J]': f'{core.work:.6g}',
-            'messages refused': str(core.refused),
-            'age of the last sample [s]': f'{age:.6g}' if math.isfinite(age) else 'nan',
+            'force [N]': command.force,
+            'torque [N·m]': command.torque,
+            'work [J]': core.work,
+            'messages refused': core.refused,
+            AGE: age,
         },
     )
