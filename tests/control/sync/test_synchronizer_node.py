@@ -39,7 +39,7 @@ class Loop:
             'simulator': bench.start('simulator', initial_phase_percent=10.0),
         }
         self.enable = bench.publisher(ENABLE)
-        bench.wait(lambda: self.joints and self.commands, 'joint states and commands')
+        bench.wait(lambda: self.joints and self.commands and self.states, 'joint states, commands and a state')
 
     @property
     def state(self) -> str:
