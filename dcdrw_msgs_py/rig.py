@@ -46,8 +46,15 @@ class WheelParams(NamedTuple):
     """One rimless wheel; the paper's wheel by default."""
 
     length: Length = WheelShape().length
-    mass: Annotated[float, Quantity('point mass at the hub, m', 'kg', above=0.0)] = 10.0
+    mass: Annotated[float, Quantity('mass, its centre at the hub, m', 'kg', above=0.0)] = 10.0
     spokes: Spokes = WheelShape().spokes
+    gyration: Annotated[
+        float, Quantity('radius of gyration about the hub over ℓ, r; 0 for a point mass', low=0.0, high=2.0, live=True)
+    ] = 0.0
+    restitution: Annotated[
+        float,
+        Quantity('part of the speed lost in a rigid strike that it gives back, e', low=0.0, high=0.999, live=True),
+    ] = 0.0
 
     @property
     def alpha(self) -> float:
@@ -87,6 +94,15 @@ class RigParams(NamedTuple):
     S0: StanceDistance = math.nan
     slope: Slope = math.radians(2.0)
     gravity: Gravity = 9.81
+    coupler_friction: Annotated[
+        float, Quantity('dry friction of the coupler, F_c', 'N', low=0.0, high=1e6, live=True)
+    ] = 0.0
+    rolling_resistance: Annotated[
+        float, Quantity('torque that resists each wheel, over m g ℓ, c_r', low=0.0, high=0.2, live=True)
+    ] = 0.0
+    friction_speed: Annotated[
+        float, Quantity('speed over which both frictions turn round, v0', 'm/s', above=0.0, high=10.0, live=True)
+    ] = 0.01
 
     def resolved(self) -> 'RigParams':
         """The same rig with its derived defaults filled in."""

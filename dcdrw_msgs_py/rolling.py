@@ -8,7 +8,7 @@ from typing import Protocol, overload
 
 import numpy as np
 
-from dcdrw_msgs_py.values import Floats, Real, Value, each, functions_of
+from dcdrw_msgs_py.values import Real, Value, each, functions_of
 
 
 class Pitched(Protocol):
@@ -124,9 +124,14 @@ def stance_distance_by_hubs(
 
 
 @overload
-def speed_kept(alpha: float) -> float: ...
+def speed_kept(alpha: float, gyration: float = 0.0, restitution: float = 0.0) -> float: ...
 @overload
-def speed_kept(alpha: Floats) -> Floats: ...
-def speed_kept(alpha: Real) -> Real:
-    """The fraction of its speed that a strike leaves to a wheel that is a point mass: cos 2α (paper's (15))."""
-    return each(math.cos, 2.0 * alpha)
+def speed_kept(alpha: Real, gyration: Real, restitution: Real) -> Real: ...
+def speed_kept(alpha: Real, gyration: Real = 0.0, restitution: Real = 0.0) -> Real:
+    """The fraction η of its speed that a strike leaves to a wheel: cos 2α for a point mass (paper's (15)).
+
+    η = η0 + e (1 − η0), η0 = (cos 2α + r²)/(1 + r²): the angular momentum about the new foot is kept (McGeer 1990), and
+    of the speed so lost the part e comes back (contract §5).
+    """
+    rigid = (each(math.cos, 2.0 * alpha) + gyration**2) / (1.0 + gyration**2)
+    return rigid + restitution * (1.0 - rigid)

@@ -25,6 +25,9 @@ class Functions(Protocol):
     def cos(self, x: Real, /) -> Real:
         """Of an angle [rad]."""
 
+    def tanh(self, x: Real, /) -> Real:
+        """The hyperbolic tangent."""
+
     def hypot(self, x: Real, y: Real, /) -> Real:
         """√(x² + y²)."""
 

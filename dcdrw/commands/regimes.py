@@ -18,7 +18,7 @@ from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.model.wheel import gentlest_slope
 from dcdrw_sim.motion.ensemble import spread
 from dcdrw_sim.motion.trajectory import run as simulate
-from dcdrw_sim.relatives.even_gait import even_gait_on, even_stall_band, gentlest_even_gait
+from dcdrw_sim.relatives.even_gait import even_gait_on, even_pair, even_stall_band, gentlest_even_gait
 from dcdrw_sim.study.basin import SECONDS, judge_from, least_speeds
 from dcdrw_sim.study.regimes import gentlest_slopes, stall_bands, steepest_stall
 from dcdrw_sim.study.verdict import BAND, Verdict
@@ -63,19 +63,18 @@ def record(rig: RigParams) -> dict[str, Any]:
     """
     if rig.front != rig.rear:
         raise ValueError('regimes are those of equal wheels: make front and rear alike')
-    plain, scales = nondimensional(rig)
-    alone, alpha = spread(rig, 1, {}), rig.front.alpha
+    pair, alone = even_pair(rig), spread(rig, 1, {})
     worst_b, worst_slope = steepest_stall(rig)
-    band, cycle = even_stall_band(alpha, plain.k, rig.slope), _limit_cycle(rig)
+    band, cycle = even_stall_band(pair.alpha, pair.k, rig.slope, pair.kept), _limit_cycle(rig)
     return {
         'parameters': flatten(rig),
         'gentlest_slope': _known(float(gentlest_slopes(alone).values[0])),
-        'gentlest_slope_closed_form': gentlest_even_gait(alpha, plain.k, plain.b).slope,
-        'gentlest_slope_uncoupled': gentlest_slope(rig.front),
+        'gentlest_slope_closed_form': gentlest_even_gait(pair.alpha, pair.k, pair.b, pair.kept).slope,
+        'gentlest_slope_uncoupled': gentlest_slope(rig.front, rig.rolling_resistance),
         'gentlest_slope_any_damping': _known(worst_slope),
         'damping_that_needs_it': _known(worst_b),
         'stall_band': [_known(float(end.values[0])) for end in stall_bands(alone)],
-        'stall_band_closed_form': [scales.damping * end for end in band] if band else None,
+        'stall_band_closed_form': [pair.damping * end for end in band] if band else None,
         'limit_cycle': cycle,
         'basin': _from_every_phase(rig, cycle['theta2']) if cycle else None,
     }
@@ -87,8 +86,8 @@ def _limit_cycle(rig: RigParams) -> dict[str, Any] | None:
         fixed = return_map.fixed_point()
     except (NoReturnError, ValueError):
         return None
-    plain, scales = nondimensional(rig)
-    even = even_gait_on(plain.front.alpha, plain.k, plain.b, rig.slope)
+    pair = even_pair(rig)
+    even = even_gait_on(pair.alpha, pair.k, pair.b, rig.slope, pair.kept)
     rear = simulate(rig, State(rig.front.alpha, *fixed.state), strikes=2).strikes[-1]
     return {
         'phase': float(return_map.phase(fixed.state)),
@@ -99,13 +98,13 @@ def _limit_cycle(rig: RigParams) -> dict[str, Any] | None:
         'moduli': abs(fixed.multipliers).tolist(),
         'stable': fixed.stable,
         'closed_form': even
-        and {'theta2': even.theta2, 'period': even.period * scales.time, 'moduli': abs(even.multipliers).tolist()},
+        and {'theta2': even.theta2, 'period': even.period * pair.time, 'moduli': abs(even.multipliers).tolist()},
     }
 
 
 def _from_every_phase(rig: RigParams, theta2: float) -> dict[str, Any] | None:
     """How many of PHASES lead within the band of the limit cycle, and from how slow starts the pair walks on."""
-    if not rig.slope > gentlest_slope(rig.front):
+    if not rig.slope > gentlest_slope(rig.front, rig.rolling_resistance):
         return None
     seconds = SECONDS * nondimensional(rig)[1].time
     ends = judge_from(rig, PHASES, np.ones(len(PHASES)), seconds)

@@ -83,10 +83,29 @@ def make_urdf(params: TrialParams, fixed_coupler: bool = False) -> str:
         (FRONT, rig.front, names.front_joint, 0.1 * size),
         (REAR, rig.rear, names.rear_joint, -0.1 * size),
     ):
-        _spokes(SubElement(robot, 'link', name=f'{wheel}_wheel'), wheel, shape, 0.01 * size)
+        link = SubElement(robot, 'link', name=f'{wheel}_wheel')
+        _inertial(link, shape)
+        _spokes(link, wheel, shape, 0.01 * size)
         _joint(robot, joint, 'continuous', f'{wheel}_hub', f'{wheel}_wheel', (0.0, side, 0.0), axis=(0.0, 1.0, 0.0))
     ElementTree.indent(robot)
     return f'<?xml version="1.0"?>\n{ElementTree.tostring(robot, "unicode")}\n'
+
+
+def _inertial(link: Element, wheel: WheelParams) -> None:
+    """Mass and moments about the hub: m (r ℓ)² about the axle and, as of a flat wheel, half of it across."""
+    inertial = SubElement(link, 'inertial')
+    SubElement(inertial, 'mass', value=_numbers(wheel.mass))
+    axle = wheel.mass * (wheel.gyration * wheel.length) ** 2
+    SubElement(
+        inertial,
+        'inertia',
+        ixx=_numbers(0.5 * axle),
+        iyy=_numbers(axle),
+        izz=_numbers(0.5 * axle),
+        ixy='0',
+        ixz='0',
+        iyz='0',
+    )
 
 
 def _spokes(link: Element, wheel: str, shape: WheelParams, radius: float) -> None:

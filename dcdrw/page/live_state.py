@@ -55,7 +55,9 @@ LONGEST_MESSAGE = 200
 
 _LEFT_OUT = (LOST_SAMPLES, 'missing'), (REFUSED, 'refused'), (RESTARTS, 'times begun anew')
 _SUITE = {node.name for node in EXECUTABLES}
-CONTROLS = {field.name: field for field in fields(RigParams) if field.name in ('k', 'b', 'slope')}
+WIDEST_SLIDER = 10.0
+"""Where the slider of a parameter whose default is 0 ends at most."""
+CONTROLS = {field.name: field for field in fields(RigParams) if field.quantity.live and not field.quantity.derived}
 """What the page's sliders set."""
 
 
@@ -345,7 +347,10 @@ class LiveState:
 
 
 def _control(field: Field, rig: RigParams) -> dict[str, Any]:
-    """A slider: from 0 to four times the default; its field takes whatever the parameter may be."""
+    """A slider: from 0 to four times the default, or as far as makes sense where that is 0.
+
+    Its field takes whatever the parameter may be.
+    """
     quantity = field.quantity
     unit, scale = ('°', math.degrees(1.0)) if quantity.unit == 'rad' else (quantity.unit, 1.0)
     return {
@@ -355,7 +360,7 @@ def _control(field: Field, rig: RigParams) -> dict[str, Any]:
         'scale': scale,
         'low': _rounded(quantity.low, 6),
         'high': _rounded(quantity.high, 6),
-        'top': 4.0 * field.default,
+        'top': 4.0 * field.default or min(quantity.high, WIDEST_SLIDER),
         'value': lookup(rig, field.name),
     }
 

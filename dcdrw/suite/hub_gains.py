@@ -7,8 +7,8 @@ import numpy as np
 from dcdrw_control.sync.rear import HubGains
 from dcdrw_control.sync.safety import Limits
 from dcdrw_msgs_py.rig import RigParams
-from dcdrw_sim.model.start import require_rolling
-from dcdrw_sim.model.wheel import inertia, limit_cycle_speed
+from dcdrw_sim.model.start import require_rolling, uncoupled_speed
+from dcdrw_sim.model.wheel import inertia
 from dcdrw_tracker.gait.sync import SyncParams
 
 ANGLES = 33
@@ -36,7 +36,7 @@ def hub_gains(
     require_rolling(rig)
     wheel = rig.rear
     stiffness = max_torque / (band_percent / 100.0 * 2.0 * wheel.alpha)
-    speeds = limit_cycle_speed(wheel, rig.slope, rig.gravity, np.linspace(-wheel.alpha, wheel.alpha, ANGLES))
+    speeds = uncoupled_speed(rig, wheel, np.linspace(-wheel.alpha, wheel.alpha, ANGLES))
     return HubGains(
         stiffness, 2.0 * math.sqrt(stiffness * inertia(wheel)), tuple(speeds.tolist()), inertia(wheel), delay
     )

@@ -101,7 +101,7 @@ def draw_slope_regimes(axes: Any, dataset: Any) -> None:
         markersize=7,
         label=f'steeper than {math.degrees(slope):.3f}° no damper stalls',
     )
-    alone = math.degrees(gentlest_slope(rig.front))
+    alone = math.degrees(gentlest_slope(rig.front, rig.rolling_resistance))
     axes.axvspan(
         0.0,
         alone,

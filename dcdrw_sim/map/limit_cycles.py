@@ -71,7 +71,7 @@ class Losses(NamedTuple):
     strikes: Floats
     """Energy lost at the strikes of both wheels [J/m]: ½ m ℓ² ω² (1 − η²) each."""
     damper: Floats
-    """Energy lost in the damper [J/m]: what the strikes leave."""
+    """Energy lost in the damper and in friction [J/m]: what the strikes leave."""
 
 
 class _Steps(NamedTuple):

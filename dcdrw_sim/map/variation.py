@@ -16,7 +16,7 @@ from numpy.polynomial import legendre
 
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.values import Floats, Real
-from dcdrw_sim.model.dynamics import State, accelerations, coupler, coupler_force, reset, stance_distance
+from dcdrw_sim.model.dynamics import State, accelerations, coupler, coupler_force, grip_slope, reset, stance_distance
 from dcdrw_sim.model.wheel import inertia, kept, pull
 from dcdrw_sim.motion.pair import Segment
 
@@ -51,17 +51,22 @@ def jacobian(rig: RigParams, state: State, S: Real, external_force: float = 0.0)
     by_length = np.array([l1 * p1, zero, -l2 * p2, zero, zero]) / length
     by_product = l1 * omega1 * by_p1 - l2 * omega2 * by_p2 + np.array([zero, l1 * p1, zero, -l2 * p2, zero])
     by_rate = (by_product - rate * by_length) / length
-    by_force = coupler_force(rig._replace(D0=0.0), by_length, by_rate) + np.array([zero, zero, zero, zero, one])
+    damping = rig.b + rig.coupler_friction * grip_slope(rig, rate)
+    by_force = rig.k * by_length + damping * by_rate + np.array([zero, zero, zero, zero, one])
     by_pull = (by_force - tension * by_length) / length
 
+    slowing1, slowing2 = (
+        rig.rolling_resistance * pull(wheel, rig.gravity) * wheel.length * grip_slope(rig, wheel.length * omega)
+        for wheel, omega in ((front, omega1), (rear, omega2))
+    )
     weight1 = pull(front, rig.gravity) * np.cos(theta1 + rig.slope)
     weight2 = pull(rear, rig.gravity) * np.cos(theta2 + rig.slope)
     rows = np.array(
         [
             [zero, one, zero, zero, zero],
-            np.array([weight1, zero, zero, zero, zero]) - (tension * by_p1 + p1 * by_pull) * (l1 / inertia(front)),
+            np.array([weight1, -slowing1, zero, zero, zero]) - (tension * by_p1 + p1 * by_pull) * (l1 / inertia(front)),
             [zero, zero, zero, one, zero],
-            np.array([zero, zero, weight2, zero, zero]) + (tension * by_p2 + p2 * by_pull) * (l2 / inertia(rear)),
+            np.array([zero, zero, weight2, -slowing2, zero]) + (tension * by_p2 + p2 * by_pull) * (l2 / inertia(rear)),
             [zero, zero, zero, zero, zero],
         ]
     )

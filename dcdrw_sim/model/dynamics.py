@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_msgs_py.rolling import hub_offset
 from dcdrw_msgs_py.rolling import stance_distance as _stance_distance
 from dcdrw_msgs_py.values import Real, functions_of
@@ -56,8 +56,23 @@ def coupler(rig: RigParams, state: State, S: Real) -> Coupler:
 
 
 def coupler_force(rig: RigParams, length: Real, rate: Real) -> Real:
-    """F = k (D − D0) + b Ḋ [N], positive in tension (3)."""
-    return rig.k * (length - rig.D0) + rig.b * rate
+    """F = k (D − D0) + b Ḋ + F_c tanh(Ḋ/v0) [N], positive in tension (3), (contract §5)."""
+    return rig.k * (length - rig.D0) + rig.b * rate + rig.coupler_friction * grip(rig, rate)
+
+
+def grip(rig: RigParams, speed: Real) -> Real:
+    """tanh(v/v0), the part of a dry friction that a speed [m/s] brings to bear, with its sign."""
+    return functions_of(speed).tanh(speed / rig.friction_speed)
+
+
+def grip_slope(rig: RigParams, speed: Real) -> Real:
+    """Derivative of `grip` by the speed [s/m]."""
+    return (1.0 - grip(rig, speed) ** 2) / rig.friction_speed
+
+
+def resistance(rig: RigParams, wheel: WheelParams, omega: Real) -> Real:
+    """What rolling resistance takes of an angular acceleration [rad/s²]: c_r m g ℓ tanh(ℓ ω/v0) over the inertia."""
+    return rig.rolling_resistance * pull(wheel, rig.gravity) * grip(rig, wheel.length * omega)
 
 
 def accelerations(
@@ -72,8 +87,10 @@ def accelerations(
     front, rear, sin = rig.front, rig.rear, functions_of(state.theta1).sin
     return (
         pull(front, rig.gravity) * sin(state.theta1 + rig.slope)
+        - resistance(rig, front, state.omega1)
         + (torques[0] - spring.p1 * force * front.length) / inertia(front),
         pull(rear, rig.gravity) * sin(state.theta2 + rig.slope)
+        - resistance(rig, rear, state.omega2)
         + (torques[1] + spring.p2 * force * rear.length) / inertia(rear),
     )
 
@@ -138,5 +155,13 @@ def mechanical_energy(rig: RigParams, state: State, steps1: Real, steps2: Real) 
 
 
 def damper_power(rig: RigParams, rate: Real) -> Real:
-    """b Ḋ², what the damper takes [W]."""
-    return rig.b * rate**2
+    """b Ḋ² + F_c Ḋ tanh(Ḋ/v0), what damper and friction of the coupler take [W]."""
+    return rig.b * rate**2 + rig.coupler_friction * rate * grip(rig, rate)
+
+
+def resistance_power(rig: RigParams, state: State) -> Real:
+    """What the rolling resistance of both wheels takes [W]."""
+    return sum(
+        inertia(wheel) * resistance(rig, wheel, omega) * omega
+        for wheel, omega in ((rig.front, state.omega1), (rig.rear, state.omega2))
+    )

@@ -22,6 +22,8 @@ class Wheels(NamedTuple):
     length: Floats
     mass: Floats
     spokes: Floats
+    gyration: Floats
+    restitution: Floats
 
     @property
     def alpha(self) -> Floats:
@@ -45,6 +47,9 @@ class Rigs(NamedTuple):
     S0: Floats
     slope: Floats
     gravity: Floats
+    coupler_friction: Floats
+    rolling_resistance: Floats
+    friction_speed: Floats
 
     def with_column(self, name: str, values: Floats) -> 'Rigs':
         """The same rigs but for one parameter of the coupler or the slope."""

@@ -28,6 +28,11 @@ class Scales(NamedTuple):
         return math.sqrt(self.length / self.gravity)
 
     @property
+    def speed(self) -> float:
+        """√(g ℓ) [m/s]."""
+        return self.length / self.time
+
+    @property
     def force(self) -> float:
         """m g [N]."""
         return self.mass * self.gravity
@@ -80,4 +85,6 @@ def _convert(rig: RigParams, scales: Scales, convert: Callable[[float, float], f
         D0=convert(rig.D0, scales.length),
         S0=convert(rig.S0, scales.length),
         gravity=convert(rig.gravity, scales.gravity),
+        coupler_friction=convert(rig.coupler_friction, scales.force),
+        friction_speed=convert(rig.friction_speed, scales.speed),
     )

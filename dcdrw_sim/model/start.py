@@ -1,15 +1,16 @@
 """Starts: rig and state together, with both wheels on their uncoupled limit cycles, a given phase apart."""
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dcdrw_msgs_py.quantity import check
-from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
+from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelParams
+from dcdrw_msgs_py.values import Floats, Real
 from dcdrw_sim.model.dynamics import State
-from dcdrw_sim.model.wheel import gentlest_slope, kept, limit_cycle_speed
+from dcdrw_sim.model.wheel import gentlest_slope, limit_cycle_speed
 
 
 class Start(NamedTuple):
@@ -41,14 +42,14 @@ def start(rig: RigParams, phase: float) -> Start:
     theta1, theta2 = -rig.front.alpha, rig.rear.alpha * (1.0 - 2.0 * phase)
     state = State(
         theta1,
-        float(limit_cycle_speed(rig.front, rig.slope, rig.gravity)),
+        uncoupled_speed(rig, rig.front, theta1),
         theta2,
-        float(limit_cycle_speed(rig.rear, rig.slope, rig.gravity, theta2)),
+        uncoupled_speed(rig, rig.rear, theta2),
     )
     return Start(rig._replace(S0=rig.S0 + rig.front.step_length), state)
 
 
-def starts(rig: RigParams, phases: ArrayLike, speeds: ArrayLike = 1.0) -> NDArray[np.float64]:
+def starts(rig: RigParams, phases: ArrayLike, speeds: ArrayLike = 1.0) -> Floats:
     """States at the section, of the rig as it is: the front wheel about to strike, the feet S0 apart; shape (..., 4).
 
     Args:
@@ -64,9 +65,17 @@ def starts(rig: RigParams, phases: ArrayLike, speeds: ArrayLike = 1.0) -> NDArra
     front, rear = rig.front, rig.rear
     phase, speed = np.broadcast_arrays(np.asarray(phases, float), np.asarray(speeds, float))
     theta2 = rear.alpha * (1.0 - 2.0 * phase)
-    omega1 = limit_cycle_speed(front, rig.slope, rig.gravity) / kept(front)
-    omega2 = limit_cycle_speed(rear, rig.slope, rig.gravity, theta2)
+    omega1, omega2 = uncoupled_speed(rig, front, front.alpha), uncoupled_speed(rig, rear, theta2)
     return np.stack([np.full_like(theta2, front.alpha), omega1 * speed, theta2, omega2 * speed], axis=-1)
+
+
+@overload
+def uncoupled_speed(rig: RigParams, wheel: WheelParams, theta: float) -> float: ...
+@overload
+def uncoupled_speed(rig: RigParams, wheel: WheelParams, theta: Floats) -> Floats: ...
+def uncoupled_speed(rig: RigParams, wheel: WheelParams, theta: Real) -> Real:
+    """Speed of one of the rig's wheels on its own limit cycle at an angle θ [rad/s]: `limit_cycle_speed`."""
+    return limit_cycle_speed(wheel, rig.slope, rig.gravity, theta, rig.rolling_resistance)
 
 
 def require_rolling(rig: RigParams) -> None:
@@ -77,7 +86,7 @@ def require_rolling(rig: RigParams) -> None:
 
     """
     for name, wheel in ((FRONT, rig.front), (REAR, rig.rear)):
-        least = gentlest_slope(wheel)
+        least = gentlest_slope(wheel, rig.rolling_resistance)
         if not rig.slope > least:
             raise ValueError(
                 f'slope {rig.slope:.6g} rad ({math.degrees(rig.slope):.4g}°) is too gentle for the {name} wheel to '

@@ -21,7 +21,13 @@ Record = dict[str, Json]
 
 _NUMBERS = ('g', 'slope', 'k', 'b', 'D0', 'S0')
 _PAIRS = ('l', 'm', 'alpha')
+_OPTIONAL_NUMBERS = ('coupler_friction', 'rolling_resistance', 'friction_speed')
+_OPTIONAL_PAIRS = ('gyration', 'restitution')
 _BESIDE = ('case', 'strikes', 'end')
+_DEFAULTS = {
+    **{key: float(RigParams._field_defaults[key]) for key in _OPTIONAL_NUMBERS},
+    **{key: float(WheelParams._field_defaults[key]) for key in _OPTIONAL_PAIRS},
+}
 
 
 class Case(NamedTuple):
@@ -39,8 +45,9 @@ class Case(NamedTuple):
 def read_cases(path: Path) -> tuple[list[Case], bool]:
     """Read one case or a list of cases; the second value tells whether it was a list.
 
-    A case is an object with g, slope, k, b, D0, S0, the pairs l, m, alpha, and x0 = [θ1, ω1, θ2, ω2]; or
-    such an object under the key `case` beside its `strikes`.
+    A case is an object with g, slope, k, b, D0, S0, the pairs l, m, alpha, and x0 = [θ1, ω1, θ2, ω2],
+    and where a rig has any, the pairs gyration and restitution, and coupler_friction, rolling_resistance and
+    friction_speed; or such an object under the key `case` beside its `strikes`.
 
     Raises:
         ValueError: not JSON, not a case, an unknown key, or an impossible case: the message names the file, the case
@@ -63,7 +70,7 @@ def _parse(entry: Json, where: str) -> Case:
     raw = entry.get('case', entry) if isinstance(entry, dict) else None
     if not isinstance(raw, dict):
         raise ValueError(f'{where}: must be an object with the keys {", ".join((*_NUMBERS, *_PAIRS, "x0"))}')
-    known = ('name', *_NUMBERS, *_PAIRS, 'x0')
+    known = ('name', *_NUMBERS, *_PAIRS, 'x0', *_DEFAULTS)
     for keys, allowed in ((raw, known if raw is not entry else (*known, *_BESIDE)), (entry, (*known, *_BESIDE))):
         for key in keys:
             if key not in allowed:
@@ -76,10 +83,13 @@ def _parse(entry: Json, where: str) -> Case:
         if not 0.0 < angle <= math.pi / 4:
             raise ValueError(f'{where}: alpha must be in (0, π/4] rad, got {angle}')
     front, rear = (
-        WheelParams(length=length, mass=mass, spokes=math.pi / alpha)
-        for length, mass, alpha in zip(lengths, masses, alphas, strict=True)
+        WheelParams(length=length, mass=mass, spokes=math.pi / alpha, gyration=gyration, restitution=restitution)
+        for length, mass, alpha, gyration, restitution in zip(
+            lengths, masses, alphas, *(_numbers(raw, key, where, 2) for key in _OPTIONAL_PAIRS), strict=True
+        )
     )
-    rig = RigParams(front=front, rear=rear, k=k, b=b, D0=D0, S0=S0, slope=slope, gravity=g)
+    friction = {key: _numbers(raw, key, where)[0] for key in _OPTIONAL_NUMBERS}
+    rig = RigParams(front=front, rear=rear, k=k, b=b, D0=D0, S0=S0, slope=slope, gravity=g, **friction)
     state = State(*_numbers(raw, 'x0', where, 4))
     try:
         Simulation(rig, state)
@@ -91,6 +101,8 @@ def _parse(entry: Json, where: str) -> Case:
 
 def _numbers(raw: Record, key: str, where: str, count: int = 1) -> list[float]:
     if key not in raw:
+        if key in _DEFAULTS:
+            return [_DEFAULTS[key]] * count
         raise ValueError(f'{where}: {key} is missing')
     values = raw[key] if count > 1 else [raw[key]]
     if not isinstance(values, list) or len(values) != count or not all(map(_is_number, values)):

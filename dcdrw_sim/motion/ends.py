@@ -85,7 +85,13 @@ def accept(rig: RigParams) -> RigParams:
     rig = check(rig).resolved()
     fastest = STIFFEST * math.sqrt(rig.gravity / rig.front.length)
     mass = 1.0 / (1.0 / rig.front.mass + 1.0 / rig.rear.mass)
-    for name, value, most in (('k', rig.k, mass * fastest**2), ('b', rig.b, mass * fastest)):
+    rub, roll = (value / rig.friction_speed for value in (rig.coupler_friction, rig.rolling_resistance))
+    for name, value, most in (
+        ('k', rig.k, mass * fastest**2),
+        ('b', rig.b, mass * fastest),
+        ('coupler_friction / friction_speed', rub, mass * fastest),
+        ('rolling_resistance / friction_speed', roll, fastest / rig.gravity),
+    ):
         if value > most:
             raise ValueError(
                 f'{name} must be ≤ {most:.3g} with these wheels, got {value:g}: a stiffer coupler is a '

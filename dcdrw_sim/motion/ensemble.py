@@ -41,6 +41,7 @@ from dcdrw_sim.motion.taylor import (
     Table,
     bare,
     expand,
+    friction_step,
     minimum,
     motion,
     rows,
@@ -170,7 +171,8 @@ def run_pairs(
     )
     if count:
         with np.errstate(all='ignore'):
-            _run(_aligned(SIZE), _parameters(rigs), starts, float(seconds), float(tolerance), *ensemble)
+            friction = bool((rigs.coupler_friction > 0.0).any() or (rigs.rolling_resistance > 0.0).any())
+            _run(_aligned(SIZE), _parameters(rigs), starts, float(seconds), float(tolerance), friction, *ensemble)
     if strict and (lost := np.flatnonzero(ensemble.ends == TOO_FAST)).size:
         raise MotionError(
             f'the motion of pair {lost[0]} at t = {ensemble.durations[lost[0]]:.9g} s is too fast to follow'
@@ -218,7 +220,12 @@ def _check(rigs: Rigs) -> None:
                 accept(rig_at(rigs, index))
     mass = 1.0 / (1.0 / rigs.front.mass + 1.0 / rigs.rear.mass)
     fastest = STIFFEST * np.sqrt(rigs.gravity / rigs.front.length)
-    for stiffness in (rigs.k / (mass * fastest**2), rigs.b / (mass * fastest)):
+    for stiffness in (
+        rigs.k / (mass * fastest**2),
+        rigs.b / (mass * fastest),
+        rigs.coupler_friction / rigs.friction_speed / (mass * fastest),
+        rigs.rolling_resistance / rigs.friction_speed / (fastest / rigs.gravity),
+    ):
         if stiffness.max() > 1.0:
             accept(rig_at(rigs, int(np.argmax(stiffness))))
 
@@ -298,7 +305,8 @@ def _acceleration(w: Table, l: int, i: int, theta: float, S: float) -> Row:
     dx, dy = l1 * math.sin(theta1) - l2 * math.sin(theta2) + S, l1 * math.cos(theta1) - l2 * math.cos(theta2)
     length = math.sqrt(dx * dx + dy * dy)
     rate = (-l2 * p2 * w[OMEGA2 + l] if i == 0 else l1 * p1 * w[OMEGA1 + l]) / length
-    pull = (w[taylor.K + l] * (length - w[taylor.D0 + l]) + w[taylor.B + l] * rate) / length
+    force = w[taylor.K + l] * (length - w[taylor.D0 + l]) + w[taylor.B + l] * rate
+    pull = (force + w[taylor.RUB + l] * math.tanh(rate * w[taylor.INV_V0 + l])) / length
     torque = -p1 * pull * w[taylor.INV_ML1 + l] if i == 0 else p2 * pull * w[taylor.INV_ML2 + l]
     weight = math.sin(theta) * w[taylor.COS_SLOPE + l] + math.cos(theta) * w[taylor.SIN_SLOPE + l]
     return w[taylor.G1 + i * LANES + l] * weight + torque
@@ -380,6 +388,7 @@ def _run(
     starts: Floats,
     seconds: float,
     tolerance: float,
+    friction: bool,
     records: NDArray[np.void],
     counts: NDArray[np.int64],
     ends: NDArray[np.int64],
@@ -403,9 +412,11 @@ def _run(
                 following += 1
         if active == 0:
             return
-        expand(w, LANES)
+        expand(w, LANES, friction)
         for l in range(LANES):
             w[REACH + l] = min(step_size(w, l, tolerance), LONGEST_STEP * w[UNIT + l])
+            if friction:
+                w[REACH + l] = friction_step(w, l, w[REACH + l])
             w[STEP + l] = max(0.0, min(w[REACH + l], seconds - w[TIME + l]))
         _cut_steps(w)
         lanes[THETA1], lanes[OMEGA1], lanes[THETA2], lanes[OMEGA2] = motion(lanes, lanes[STEP], lanes[STEP])

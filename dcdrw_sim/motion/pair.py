@@ -154,16 +154,24 @@ class Simulation:
 
     @property
     def rig(self) -> RigParams:
-        """The rig as it is now; assign a changed one to go on with it (its wheels and S0 stay as they were)."""
+        """The rig as it is now; assign a changed one to go on with it.
+
+        Lengths, masses and spokes of the wheels, and S0, stay as they were.
+        .
+        """
         return self._rig
 
     @rig.setter
     def rig(self, rig: RigParams) -> None:
         rig = check(rig).resolved()  # its D0 goes by its own S0
-        rig = accept(rig._replace(front=self._rig.front, rear=self._rig.rear, S0=self._rig.S0))
+        front, rear = (
+            now._replace(gyration=wheel.gyration, restitution=wheel.restitution)
+            for now, wheel in zip(self._wheels, (rig.front, rig.rear), strict=True)
+        )
+        rig = accept(rig._replace(front=front, rear=rear, S0=self._rig.S0))
         if rig != self._rig:
             self._start_anew()
-            self._rig = rig
+            self._rig, self._wheels = rig, (rig.front, rig.rear)
             self._write_parameters()
 
     @property
@@ -280,8 +288,10 @@ class Simulation:
             if self.standing[i]:
                 self._rest(i)
         w = self._work
-        taylor.expand(w, 1)
-        h = self._turn_once(min(taylor.step_size(w, 0, TOLERANCE), LONGEST_STEP * self._unit))
+        friction = self._rig.coupler_friction > 0.0 or self._rig.rolling_resistance > 0.0
+        taylor.expand(w, 1, friction)
+        h = min(taylor.step_size(w, 0, TOLERANCE), LONGEST_STEP * self._unit)
+        h = self._turn_once(taylor.friction_step(w, 0, h) if friction else h)
         self._require_progress(h >= SHORTEST_STEP * self._unit)
         wheel, direction = 0, NONE
         for i in (0, 1):

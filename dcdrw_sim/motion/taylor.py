@@ -10,9 +10,11 @@ The equations are the paper's (1)–(12) in the contract's shorter form, in whic
 with the difference δ = θ1 − θ2 as a third angle, the length of the coupler follows from the angles alone:
 
     D²  = ℓ1² + ℓ2² + S² + 2 S (ℓ1 sin θ1 − ℓ2 sin θ2) − 2 ℓ1 ℓ2 cos δ
-    F   = k (D − D0) + b Ḋ + F_ext
-    ω1' = g/ℓ1 sin(θ1 + γ) − (ℓ2 sin δ + S cos θ1) (F/D)/(m1 ℓ1) + T1/(m1 ℓ1²)
-    ω2' = g/ℓ2 sin(θ2 + γ) + (ℓ1 sin δ + S cos θ2) (F/D)/(m2 ℓ2) + T2/(m2 ℓ2²)
+    F   = k (D − D0) + b Ḋ + F_c tanh(Ḋ/v0) + F_ext
+    ω1' = G1 (sin(θ1 + γ) − c_r tanh(ℓ1 ω1/v0)) − (ℓ2 sin δ + S cos θ1) (F/D) ℓ1/I1 + T1/I1
+    ω2' = G2 (sin(θ2 + γ) − c_r tanh(ℓ2 ω2/v0)) + (ℓ1 sin δ + S cos θ2) (F/D) ℓ2/I2 + T2/I2
+
+with I_i = m_i ℓ_i² (1 + r_i²) and G_i = m_i g ℓ_i/I_i.
 
 Products of series are convolutions (Jorba and Zou, Exp. Math. 14, 2005). Sine and cosine follow from
 sin' = ω cos and cos' = −ω sin; D and F/D from D·D and D·(F/D), solved for the newest coefficient.
@@ -39,6 +41,9 @@ LANES = 16
 """Pairs side by side: two AVX-512 or four AVX2 registers."""
 ORDER = 16
 """Degree of the polynomials; a power of two, so that the step size takes square roots only."""
+
+NUMB, SWING = 16.0, 4.0
+"""Friction's u = v/v0 beyond which tanh u is ±1 to rounding, and by how much u may change in a step within."""
 
 _SERIES = (ORDER + 1) * LANES
 (THETA1, OMEGA1, SIN1, COS1, THETA2, OMEGA2, SIN2, COS2, OMEGA, SIN, COS, LEVER1, LEVER2, LENGTH, PULL) = range(
@@ -72,10 +77,18 @@ _SERIES = (ORDER + 1) * LANES
     KEPT2,
     DRIVE1,
     DRIVE2,
-    END,
-) = range(15 * _SERIES, 15 * _SERIES + 28 * LANES, LANES)
-FIRST_PARAMETER, PARAMETERS = G1, (END - G1) // LANES
+    RUB,
+    INV_V0,
+    ROLLING,
+    _PARAMETERS_END,
+) = range(15 * _SERIES, 15 * _SERIES + 31 * LANES, LANES)
+FIRST_PARAMETER, PARAMETERS = G1, (_PARAMETERS_END - G1) // LANES
 """Where the parameters begin, and how many there are."""
+
+(SURGE, SURGE1, SURGE2, GRIP, GRIP1, GRIP2, LOOSE, LOOSE1, LOOSE2, END) = range(
+    _PARAMETERS_END, _PARAMETERS_END + 10 * _SERIES, _SERIES
+)
+"""Series of friction, used where there is any: u', tanh u and 1 − tanh² u, for u = Ḋ/v0, ℓ1 ω1/v0 and ℓ2 ω2/v0."""
 
 Product = tuple[int, int, int]
 """Where the coefficient goes, and the two factors."""
@@ -89,6 +102,8 @@ _ROTATIONS = (
 )
 _COUPLER = ((SUM1, LENGTH + LANES, LENGTH + LANES), (SUM2, LENGTH + LANES, PULL))  # without D's constant coefficient
 _TORQUES = ((SUM1, LEVER1, PULL), (SUM2, LEVER2, PULL))
+_GRIPS = ((SUM4, SURGE, LOOSE), (SUM5, SURGE1, LOOSE1), (SUM6, SURGE2, LOOSE2))
+_SQUARES = ((SUM4, GRIP, GRIP), (SUM5, GRIP1, GRIP1), (SUM6, GRIP2, GRIP2))
 
 # Coefficients of sin x / x and cos x in powers of −x² as ratios of neighbours, highest first (Horner).
 _SIN = tuple(1.0 / ((2 * j) * (2 * j + 1)) for j in range(9, 0, -1))
@@ -126,6 +141,9 @@ def work_parameters(
         KEPT2: kept(rear),
         DRIVE1: torques[0] / inertia(front),
         DRIVE2: torques[1] / inertia(rear),
+        RUB: rig.coupler_friction,
+        INV_V0: 1.0 / rig.friction_speed,
+        ROLLING: rig.rolling_resistance,
         FREE1: 1.0,
         FREE2: 1.0,
     }
@@ -189,12 +207,13 @@ def cos_series(x: Row) -> Row:
     return total
 
 
-def expand(work: Table, lanes: int) -> None:
+def expand(work: Table, lanes: int, friction: bool) -> None:
     """Expand the motion about the state: fill the series from coefficient 0 of the angles and speeds.
 
     Args:
         work: work array, at least END long, with state and parameters set; angles within ±π/4.
         lanes: 1 for a list, LANES for an array.
+        friction: whether the coupler or a wheel has any; without, its series are left alone.
 
     """
     w = rows(work, lanes)
@@ -215,7 +234,11 @@ def expand(work: Table, lanes: int) -> None:
         w[SIN + following], w[COS + following] = w[SUM5] * scale, cos
         convolve(w, _COUPLER, order - 1)
         length = (stance * (l1 * sin1 - l2 * sin2) - l1 * l2 * cos - 0.5 * w[SUM1]) * inverse
-        force = w[K] * w[LENGTH + n] + w[B] * ((order + 1) * length)
+        rate = (order + 1) * length
+        force = w[K] * w[LENGTH + n] + w[B] * rate
+        if friction:
+            _grip(work, w, lanes, order, rate)
+            force = force + w[RUB] * w[GRIP + n]
         if order == 0:
             force = force + w[FORCE] - w[K] * w[D0]
         w[LENGTH + following], w[PULL + n] = length, (force - w[SUM2]) * inverse
@@ -224,12 +247,36 @@ def expand(work: Table, lanes: int) -> None:
         convolve(w, _TORQUES, order)
         weight1 = w[SIN1 + n] * w[COS_SLOPE] + w[COS1 + n] * w[SIN_SLOPE]
         weight2 = w[SIN2 + n] * w[COS_SLOPE] + w[COS2 + n] * w[SIN_SLOPE]
+        if friction:
+            weight1, weight2 = weight1 - w[ROLLING] * w[GRIP1 + n], weight2 - w[ROLLING] * w[GRIP2 + n]
         omega1, omega2 = w[G1] * weight1 - w[SUM1] * w[INV_ML1], w[G2] * weight2 + w[SUM2] * w[INV_ML2]
         if order == 0:
             omega1, omega2 = omega1 + w[DRIVE1], omega2 + w[DRIVE2]
         omega1, omega2 = omega1 * (w[FREE1] * scale), omega2 * (w[FREE2] * scale)
         w[THETA1 + following], w[THETA2 + following] = w[OMEGA1 + n] * scale, w[OMEGA2 + n] * scale
         w[OMEGA1 + following], w[OMEGA2 + following], w[OMEGA + following] = omega1, omega2, omega1 - omega2
+        if friction:
+            w[SURGE1 + n] = w[L1] * w[INV_V0] * ((order + 1) * omega1)
+            w[SURGE2 + n] = w[L2] * w[INV_V0] * ((order + 1) * omega2)
+
+
+def _grip(work: Table, w: Table, lanes: int, order: int, rate: Row) -> None:
+    """The next coefficient of each friction's tanh u, from u' (1 − tanh² u), and of 1 − tanh² u."""
+    n = order * LANES
+    if order == 0:
+        w[GRIP], w[GRIP1], w[GRIP2] = rate * w[INV_V0], w[L1] * w[OMEGA1] * w[INV_V0], w[L2] * w[OMEGA2] * w[INV_V0]
+        for l in range(lanes):
+            work[GRIP + l] = math.tanh(work[GRIP + l])
+            work[GRIP1 + l] = math.tanh(work[GRIP1 + l])
+            work[GRIP2 + l] = math.tanh(work[GRIP2 + l])
+    else:
+        w[SURGE + n - LANES] = rate * w[INV_V0] * order
+        convolve(w, _GRIPS, order - 1)
+        scale = 1.0 / order
+        w[GRIP + n], w[GRIP1 + n], w[GRIP2 + n] = w[SUM4] * scale, w[SUM5] * scale, w[SUM6] * scale
+    convolve(w, _SQUARES, order)
+    one = 1.0 if order == 0 else 0.0
+    w[LOOSE + n], w[LOOSE1 + n], w[LOOSE2 + n] = one - w[SUM4], one - w[SUM5], one - w[SUM6]
 
 
 def motion(w: Table, t1: Row, t2: Row) -> tuple[Row, Row, Row, Row]:
@@ -246,6 +293,29 @@ def step_size(w: Work, l: int, tolerance: float) -> float:
     """The step at which the angles' last terms fall to the tolerance [rad]."""
     last = abs(w[THETA1 + ORDER * LANES + l]) + abs(w[THETA2 + ORDER * LANES + l]) + 1e-300
     return math.sqrt(math.sqrt(math.sqrt(math.sqrt(tolerance / last))))
+
+
+def friction_step(w: Work, l: int, h: float) -> float:
+    """A step no longer than friction allows.
+
+    Where |u| > NUMB, tanh u is ±1 to rounding and its series tells nothing of the turn at u = 0: a step ends before it
+    gets there. Nearer, u changes by at most SWING, within which the series converges.
+    """
+    per_speed = w[INV_V0 + l]
+    if w[RUB + l] > 0.0:
+        h = _gentle(w, SURGE + l, abs(w[LENGTH + LANES + l]) * per_speed, h)
+    if w[ROLLING + l] > 0.0:
+        h = _gentle(w, SURGE1 + l, abs(w[L1 + l] * w[OMEGA1 + l]) * per_speed, h)
+        h = _gentle(w, SURGE2 + l, abs(w[L2 + l] * w[OMEGA2 + l]) * per_speed, h)
+    return h
+
+
+def _gentle(w: Work, surge: int, u: float, h: float) -> float:
+    """The step h or, where it may change u by more than it should, a shorter one; from the series of u'."""
+    most, change = max(SWING, u - NUMB), 0.0
+    for j in range(ORDER - 2, -1, -1):
+        change = change * h + abs(w[surge + j * LANES]) / (j + 1)
+    return most / change if change * h > most else h
 
 
 def evaluate(w: Work, series: int, l: int, t: float) -> float:

@@ -21,8 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
+from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.rolling import speed_kept
 from dcdrw_sim.map.return_map import Complexes, spectrum
+from dcdrw_sim.model.scaling import nondimensional
+from dcdrw_sim.model.wheel import inertia, kept
 
 Floats = NDArray[np.float64]
 
@@ -32,6 +35,32 @@ FLAT = 1e-6
 """Where the spring just balances the weight, 1 − 2 k̂ = 0, this stands for 0."""
 DAMPINGS = (1e-3, 1e3)
 """Dampings b̂ between which a stall band is sought."""
+
+
+class EvenPair(NamedTuple):
+    """A rig of equal wheels as this gait knows it, and the units of that.
+
+    A wheel's gyration slows its motion by √(1 + r²): that is a unit of time, and it makes b̂ smaller. Friction is left
+    out.
+    """
+
+    alpha: float
+    k: float
+    b: float
+    kept: float
+    time: float
+    """[s]"""
+    damping: float
+    """[N·s/m]"""
+
+
+def even_pair(rig: RigParams) -> EvenPair:
+    """The front wheel, the coupler and the units of a rig."""
+    plain, scales = nondimensional(rig)
+    slower = math.sqrt(inertia(plain.front))
+    return EvenPair(
+        plain.front.alpha, plain.k, plain.b / slower, kept(plain.front), scales.time * slower, scales.damping * slower
+    )
 
 
 class EvenGait(NamedTuple):
@@ -51,7 +80,7 @@ class EvenGait(NamedTuple):
     """Of a whole step, the largest first, shape (3,)."""
 
 
-def even_gait(alpha: float, k: float, b: float, period: float) -> EvenGait:
+def even_gait(alpha: float, k: float, b: float, period: float, kept: float | None = None) -> EvenGait:
     """The gait with that period, and the slope that it takes.
 
     Args:
@@ -59,9 +88,10 @@ def even_gait(alpha: float, k: float, b: float, period: float) -> EvenGait:
         k: k̂.
         b: b̂.
         period: of a step, in √(ℓ/g).
+        kept: η, by default that of a point mass, cos 2α.
 
     """
-    start, flow, (omega1, theta2, omega2, slope) = _solve(alpha, k, b, period)
+    start, flow, (omega1, theta2, omega2, slope) = _solve(alpha, k, b, period, kept)
     # Half a step's derivative: [ω, θ, ω′] before a strike to [θ2′, θ1, θ1′] before the next, where θ2 is α again.
     motion = flow[:, :4] @ start[:4, :3]
     pull = k * theta2 + b * (omega2 - omega1)
@@ -70,44 +100,46 @@ def even_gait(alpha: float, k: float, b: float, period: float) -> EvenGait:
     return EvenGait(slope, period, omega1, theta2, omega2, spectrum(half @ half))
 
 
-def gentlest_even_gait(alpha: float, k: float, b: float) -> EvenGait:
+def gentlest_even_gait(alpha: float, k: float, b: float, kept: float | None = None) -> EvenGait:
     """The gait on the gentlest slope: that of the fold, or the slowest where the slope falls with the period."""
-    return even_gait(alpha, k, b, _least(alpha, k, b)[0])
+    return even_gait(alpha, k, b, _least(alpha, k, b, kept)[0], kept)
 
 
-def even_gait_on(alpha: float, k: float, b: float, slope: float) -> EvenGait | None:
+def even_gait_on(alpha: float, k: float, b: float, slope: float, kept: float | None = None) -> EvenGait | None:
     """The quicker gait on a slope [rad], the one that may be stable; None where the slope is too gentle."""
-    gentlest = gentlest_even_gait(alpha, k, b)
+    gentlest = gentlest_even_gait(alpha, k, b, kept)
     if not slope > gentlest.slope:
         return None
-    period = brentq(lambda period: _slope(alpha, k, b, period) - slope, SHORTEST, gentlest.period, xtol=1e-12)
-    return even_gait(alpha, k, b, float(period))
+    period = brentq(lambda period: _slope(alpha, k, b, period, kept) - slope, SHORTEST, gentlest.period, xtol=1e-12)
+    return even_gait(alpha, k, b, float(period), kept)
 
 
-def worst_damping(alpha: float, k: float) -> float:
+def worst_damping(alpha: float, k: float, kept: float | None = None) -> float:
     """The damping b̂ that needs the steepest slope."""
     low, high = map(math.log, DAMPINGS)
-    found = minimize_scalar(lambda log_b: -_least(alpha, k, math.exp(log_b))[1], bounds=(low, high), method='bounded')
+    found = minimize_scalar(
+        lambda log_b: -_least(alpha, k, math.exp(log_b), kept)[1], bounds=(low, high), method='bounded'
+    )
     return math.exp(found.x)
 
 
-def even_stall_band(alpha: float, k: float, slope: float) -> tuple[float, float] | None:
+def even_stall_band(alpha: float, k: float, slope: float, kept: float | None = None) -> tuple[float, float] | None:
     """The dampings b̂ between which no pair walks on a slope [rad]; None where there are none."""
 
     def lack(log_b: float) -> float:
-        return _least(alpha, k, math.exp(log_b))[1] - slope
+        return _least(alpha, k, math.exp(log_b), kept)[1] - slope
 
-    worst = math.log(worst_damping(alpha, k))
+    worst = math.log(worst_damping(alpha, k, kept))
     if not lack(worst) > 0.0:
         return None
     low, high = (math.exp(brentq(lack, worst, end) if lack(end) < 0.0 else end) for end in map(math.log, DAMPINGS))
     return low, high
 
 
-def _least(alpha: float, k: float, b: float) -> tuple[float, float]:
+def _least(alpha: float, k: float, b: float, kept: float | None = None) -> tuple[float, float]:
     """The period that takes the gentlest slope, and that slope."""
     found = minimize_scalar(
-        lambda period: _slope(alpha, k, b, period),
+        lambda period: _slope(alpha, k, b, period, kept),
         bounds=(SHORTEST, LONGEST),
         method='bounded',
         options={'xatol': 1e-8},
@@ -115,15 +147,17 @@ def _least(alpha: float, k: float, b: float) -> tuple[float, float]:
     return float(found.x), float(found.fun)
 
 
-def _slope(alpha: float, k: float, b: float, period: float) -> float:
-    return _solve(alpha, k, b, period)[2][3]
+def _slope(alpha: float, k: float, b: float, period: float, kept: float | None = None) -> float:
+    return _solve(alpha, k, b, period, kept)[2][3]
 
 
-def _solve(alpha: float, k: float, b: float, period: float) -> tuple[Floats, Floats, list[float]]:
+def _solve(
+    alpha: float, k: float, b: float, period: float, kept: float | None = None
+) -> tuple[Floats, Floats, list[float]]:
     """The start of half a step and its flow, both linear in [ω, θ, ω′, γ, 1], and [ω, θ, ω′, γ] of the gait."""
     flow = _flow(alpha, k, b, 0.5 * period)
     start, end = np.zeros((6, 5)), np.zeros((4, 5))
-    start[0, 4], start[1, 0], start[2, 1], start[3, 2] = -alpha, speed_kept(alpha), 1.0, 1.0
+    start[0, 4], start[1, 0], start[2, 1], start[3, 2] = -alpha, speed_kept(alpha) if kept is None else kept, 1.0, 1.0
     start[4, 3] = start[5, 4] = 1.0
     end[0, 1] = end[1, 2] = end[3, 0] = 1.0
     end[2, 4] = alpha

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.optimize import brentq, minimize_scalar
 
-from dcdrw_msgs_py.quantity import check
+from dcdrw_msgs_py.quantity import check, lookup
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.model.dynamics import State, coupler
 from dcdrw_sim.model.wheel import kinetic_energy
@@ -101,6 +101,12 @@ class RigidPair:
                 f'a rigid pair needs wheels of equal step length, got {front.step_length:.6g} m in front '
                 f'and {rear.step_length:.6g} m behind'
             )
+        for name in ('front.gyration', 'rear.gyration', 'front.restitution', 'rear.restitution', 'rolling_resistance'):
+            if lookup(rig, name):
+                raise ValueError(
+                    f'a rigid pair is one of point masses that roll without loss: {name} must be 0, '
+                    f'got {lookup(rig, name):g}'
+                )
         self.rig, self.phase = rig, phase
         rear_angle = rear.alpha * (1.0 - 2.0 * phase)
         rise = front.length * math.cos(front.alpha) - rear.length * math.cos(rear_angle)

@@ -19,7 +19,7 @@ from dcdrw_sim.model.rigs import Rigs, take
 from dcdrw_sim.model.start import require_rolling
 from dcdrw_sim.model.wheel import gentlest_slope
 from dcdrw_sim.motion.ensemble import spread
-from dcdrw_sim.study.points import judge_points, run_starts, section_room, wheels_of
+from dcdrw_sim.study.points import judge_points, run_starts, section_room, uncoupled
 from dcdrw_sim.study.verdict import Verdict, judge
 
 Floats = NDArray[np.float64]
@@ -301,7 +301,9 @@ def _multiplied(rig: RigParams, name: str, factors: Floats) -> Rigs:
 def _score(task: Task, rigs: Rigs, report: Report = lambda count: None) -> tuple[NDArray[Any], ...]:
     """The columns of `Scores` behind k and b."""
     count = len(rigs.k)
-    gentlest = [max(gentlest_slope(front), gentlest_slope(rear)) for front, rear, *_ in wheels_of(rigs)]
+    gentlest = [
+        max(gentlest_slope(wheel, rig.rolling_resistance) for wheel in (rig.front, rig.rear)) for rig in uncoupled(rigs)
+    ]
     rolling = np.flatnonzero(rigs.slope > gentlest)
     verdict, settles = np.full(count, Verdict.STALLS, np.int8), np.zeros(count)  # what becomes of those that do not
     columns: tuple[NDArray[Any], ...] = (verdict, settles, *(np.full(count, math.nan) for _ in range(3)))

@@ -8,19 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dcdrw_msgs_py.rig import RigParams, WheelParams
+from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.map.limit_cycles import LimitCycles, find_limit_cycles, losses
 from dcdrw_sim.map.regression import PHASES, fit_affine, fit_raw
 from dcdrw_sim.map.return_map import Complexes, spectrum
 from dcdrw_sim.model.rigs import Rigs, rig_at, take
-from dcdrw_sim.model.start import require_rolling, starts
-from dcdrw_sim.model.wheel import limit_cycle_speed
+from dcdrw_sim.model.start import require_rolling, starts, uncoupled_speed
 from dcdrw_sim.motion.ensemble import Ensemble, run_pairs
 from dcdrw_sim.study.verdict import BAND, Judgement, Sections, Verdict, judge
 
 Floats = NDArray[np.float64]
-Wheels = tuple[WheelParams, WheelParams, float, float]
-"""What an uncoupled limit cycle depends on: front and rear wheel, slope and gravity."""
 
 ROCKING = 200
 """Room for the strikes of two wheels that rock until they stand: each about ln(1e-6)/ln(cos 30°) = 96."""
@@ -70,7 +67,7 @@ def judge_points(
 
 def run_starts(rigs: Rigs, seconds: float, phases: tuple[float, ...], room: int) -> tuple[Rigs, Ensemble]:
     """The motions of N rigs from every start, and the rig of each motion; arguments as of `judge_points`."""
-    states = np.concatenate([_start_states(*wheels, phases) for wheels in wheels_of(rigs)])
+    states = np.concatenate([_start_states(alone, phases) for alone in uncoupled(rigs)])
     pairs = take(rigs, np.repeat(np.arange(len(rigs.k)), len(phases)))
     return pairs, run_pairs(pairs, states, seconds, 2 * room + ROCKING, strict=False)
 
@@ -82,33 +79,34 @@ def section_room(rigs: Rigs, seconds: float) -> int:
         ValueError: one does not roll.
 
     """
-    fastest = max((_fastest(*wheels) for wheels in set(wheels_of(rigs))), default=0.0)
+    fastest = max(map(_fastest, set(uncoupled(rigs))), default=0.0)
     return math.ceil(fastest * seconds) + 2
 
 
-def wheels_of(rigs: Rigs) -> Iterator[Wheels]:
-    """The wheels of every rig, with its slope and gravity."""
+def uncoupled(rigs: Rigs) -> Iterator[RigParams]:
+    """Every rig but for its coupler: all that the limit cycles of its wheels alone depend on."""
     for index in range(len(rigs.k)):
         rig = rig_at(rigs, index)
-        yield rig.front, rig.rear, rig.slope, rig.gravity
+        yield RigParams(
+            rig.front,
+            rig.rear,
+            slope=rig.slope,
+            gravity=rig.gravity,
+            rolling_resistance=rig.rolling_resistance,
+            friction_speed=rig.friction_speed,
+        )
 
 
-def _fastest(front: WheelParams, rear: WheelParams, slope: float, gravity: float) -> float:
+def _fastest(rig: RigParams) -> float:
     """Steps per second of the faster wheel, were it always at its fastest."""
-    rates = [
-        float(limit_cycle_speed(wheel, slope, gravity, wheel.alpha)) / (2.0 * wheel.alpha) for wheel in (front, rear)
-    ]
-    if any(map(math.isnan, rates)):
-        require_rolling(RigParams(front, rear, slope=slope, gravity=gravity))
-    return max(rates)
+    require_rolling(rig)
+    return max(float(uncoupled_speed(rig, wheel, wheel.alpha)) / (2.0 * wheel.alpha) for wheel in (rig.front, rig.rear))
 
 
 @lru_cache(maxsize=1024)
-def _start_states(
-    front: WheelParams, rear: WheelParams, slope: float, gravity: float, phases: tuple[float, ...]
-) -> Floats:
+def _start_states(rig: RigParams, phases: tuple[float, ...]) -> Floats:
     """As `starts`, shape (starts, 4)."""
-    return starts(RigParams(front, rear, slope=slope, gravity=gravity), phases)
+    return starts(rig, phases)
 
 
 def _of_points(judgement: Judgement, starts: int) -> dict[str, NDArray[Any]]:

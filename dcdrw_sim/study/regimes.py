@@ -17,9 +17,8 @@ from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.map.limit_cycles import DIFFERENCE, find_limit_cycles, step_maps
 from dcdrw_sim.map.return_map import spectrum
 from dcdrw_sim.model.rigs import Rigs, rig_at, take
-from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.motion.ensemble import run_pairs, spread
-from dcdrw_sim.relatives.even_gait import even_gait_on, even_stall_band, gentlest_even_gait, worst_damping
+from dcdrw_sim.relatives.even_gait import even_gait_on, even_pair, even_stall_band, gentlest_even_gait, worst_damping
 from dcdrw_sim.study.points import ROCKING, section_room
 from dcdrw_sim.study.verdict import Judgement, Verdict, judge
 
@@ -103,8 +102,10 @@ def gentlest_slopes(rigs: Rigs) -> Gaits:
         rigs: as `folds`; their slope has no meaning.
 
     """
-    plain = [nondimensional(rig_at(rigs, i))[0] for i in range(len(rigs.k))]
-    return folds(rigs, 'slope', [STEEP * gentlest_even_gait(rig.front.alpha, rig.k, rig.b).slope for rig in plain])
+    pairs = [even_pair(rig_at(rigs, i)) for i in range(len(rigs.k))]
+    return folds(
+        rigs, 'slope', [STEEP * gentlest_even_gait(pair.alpha, pair.k, pair.b, pair.kept).slope for pair in pairs]
+    )
 
 
 def stall_bands(rigs: Rigs) -> tuple[Gaits, Gaits]:
@@ -118,23 +119,24 @@ def stall_bands(rigs: Rigs) -> tuple[Gaits, Gaits]:
     """
     ends = np.empty((len(rigs.k), 2))
     for i, end in enumerate(ends):
-        rig, scales = nondimensional(rig_at(rigs, i))
-        low, high = even_stall_band(rig.front.alpha, rig.k, rig.slope) or FAR
-        end[:] = scales.damping * low / AWAY, scales.damping * high * AWAY
+        rig = rig_at(rigs, i)
+        pair = even_pair(rig)
+        low, high = even_stall_band(pair.alpha, pair.k, rig.slope, pair.kept) or FAR
+        end[:] = pair.damping * low / AWAY, pair.damping * high * AWAY
     return folds(rigs, 'b', ends[:, 0]), folds(rigs, 'b', ends[:, 1])
 
 
 def steepest_stall(rig: RigParams) -> tuple[float, float]:
     """The damping [N·s/m] that needs the steepest slope, and that slope [rad]: on a steeper one no damper stalls."""
-    scales = nondimensional(rig)[1]
-    center, width = math.log(worst_damping(rig.front.alpha, rig.k / scales.stiffness)), math.log(2.0)
+    pair = even_pair(rig)
+    center, width = math.log(worst_damping(pair.alpha, pair.k, pair.kept)), math.log(2.0)
     for _ in range(PEAK_ROUNDS):
         logs = np.linspace(center - width, center + width, PEAK_POINTS)
-        slopes = gentlest_slopes(spread(rig, PEAK_POINTS, {'b': scales.damping * np.exp(logs)})).values
+        slopes = gentlest_slopes(spread(rig, PEAK_POINTS, {'b': pair.damping * np.exp(logs)})).values
         if np.isnan(slopes).any():
             return math.nan, math.nan
         center, width = float(logs[slopes.argmax()]), 2.0 * width / (PEAK_POINTS - 1)
-    return scales.damping * math.exp(center), float(slopes.max())
+    return pair.damping * math.exp(center), float(slopes.max())
 
 
 def judge_starts(rigs: Rigs, states: Floats, seconds: float) -> Judgement:
@@ -241,10 +243,11 @@ def _guesses(rigs: Rigs) -> Floats:
     """Where to search each limit cycle, shape (N, 3): at the gait of evenly spaced strikes."""
     guesses = np.empty((len(rigs.k), 3))
     for i in range(len(guesses)):
-        rig, scales = nondimensional(rig_at(rigs, i))
-        even = (rig.front.alpha, rig.k, rig.b)
-        gait = even_gait_on(*even, rig.slope) or gentlest_even_gait(*even)
-        guesses[i] = gait.omega1 / scales.time, gait.theta2, gait.omega2 / scales.time
+        rig = rig_at(rigs, i)
+        pair = even_pair(rig)
+        even = (pair.alpha, pair.k, pair.b)
+        gait = even_gait_on(*even, rig.slope, pair.kept) or gentlest_even_gait(*even, pair.kept)
+        guesses[i] = gait.omega1 / pair.time, gait.theta2, gait.omega2 / pair.time
     return guesses
 
 

@@ -8,6 +8,17 @@ from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_sim.model.dynamics import State
 
 UNEQUAL = RigParams(WheelParams(0.95, 9.0, 12), WheelParams(1.05, 11.0, 13), k=20.0, b=30.0, slope=math.radians(2.5))
+REAL = RigParams(
+    WheelParams(0.9652, 8.0, 12, gyration=0.5, restitution=0.1),
+    WheelParams(0.9652, 12.0, 12, gyration=0.3, restitution=0.2),
+    k=20.0,
+    b=15.0,
+    slope=math.radians(2.5),
+    coupler_friction=0.5,
+    rolling_resistance=0.004,
+    friction_speed=0.05,
+)
+"""With all that the paper leaves out."""
 UNCOUPLED = RigParams(k=0.0, b=0.0)
 GENTLE = RigParams(slope=math.radians(0.5))
 ALPHA = RigParams().front.alpha
@@ -17,7 +28,14 @@ def between(low, high):
     return st.floats(low, high, allow_subnormal=False)
 
 
-wheels = st.builds(WheelParams, between(0.5, 1.5), between(5.0, 20.0), between(9.0, 16.0))
+wheels = st.builds(
+    WheelParams,
+    between(0.5, 1.5),
+    between(5.0, 20.0),
+    between(9.0, 16.0),
+    gyration=st.just(0.0) | between(0.0, 0.6),
+    restitution=st.just(0.0) | between(0.0, 0.2),
+)
 rigs = st.builds(
     RigParams,
     wheels,
@@ -28,6 +46,9 @@ rigs = st.builds(
     S0=between(0.8, 1.5),
     slope=between(0.06, 0.12),
     gravity=st.just(9.81),
+    coupler_friction=st.sampled_from([0.0, 0.0, 0.5]),
+    rolling_resistance=st.sampled_from([0.0, 0.0, 0.002]),
+    friction_speed=st.just(0.05),
 )
 """Pairs that keep rolling for a while."""
 

@@ -122,3 +122,12 @@ def test_joints_without_names_of_their_own_are_told_in_one_line(tmp_path, capsys
     path.write_text(FORM.format(names))
     assert main(['urdf', '--rig', str(path)]) == 2
     assert capsys.readouterr().err.startswith('dcdrw urdf: joints of a URDF need names of their own')
+
+
+def test_wheels_weigh_what_they_weigh_and_turn_as_heavily():
+    rig = RigParams(WheelParams(mass=8.0, gyration=0.5), WheelParams(mass=12.0))
+    robot = ElementTree.fromstring(make_urdf(TrialParams.of_rig(rig)).encode())
+    for name, mass, axle in (('front_wheel', 8.0, 8.0 * (0.5 * rig.front.length) ** 2), ('rear_wheel', 12.0, 0.0)):
+        inertial = robot.find(f"link[@name='{name}']/inertial")
+        assert float(inertial.find('mass').get('value')) == mass
+        assert float(inertial.find('inertia').get('iyy')) == pytest.approx(axle)

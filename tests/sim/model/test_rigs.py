@@ -14,9 +14,9 @@ from dcdrw_sim.model.start import start
 from dcdrw_sim.motion.ensemble import run_ensemble, spread
 from dcdrw_sim.motion.trajectory import run
 from tests import ROOT
-from tests.sim.rigs import UNEQUAL
+from tests.sim.rigs import REAL, UNEQUAL
 
-BEGUN = start(UNEQUAL, 0.3)
+BEGUN = start(REAL, 0.3)
 SECONDS = 1.5
 
 

@@ -103,7 +103,7 @@ def test_a_bad_file_is_refused_with_what_is_wrong_in_it(tmp_path, content, messa
 def test_bytes_that_are_no_text_are_refused(tmp_path):
     path = tmp_path / 'case.json'
     path.write_bytes(b'\xff\xfe\x00')
-    with pytest.raises(ValueError, match=r'case\.json , line 1: byte 0xff is no UTF-8 text'):
+    with pytest.raises(ValueError, match=r'case\.json, line 1: byte 0xff is no UTF-8 text'):
         read_cases(path)
 
 

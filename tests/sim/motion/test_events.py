@@ -9,22 +9,23 @@ from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_sim.model.dynamics import State, hub_distance, mechanical_energy, stance_distance
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.start import start
-from dcdrw_sim.model.wheel import kinetic_energy
+from dcdrw_sim.model.wheel import kept, kinetic_energy
 from dcdrw_sim.motion.cases import read_cases
 from dcdrw_sim.motion.ends import BACKWARD, FORWARD, End
 from dcdrw_sim.motion.pair import Simulation
 from dcdrw_sim.motion.trajectory import run
 from tests import ROOT
 from tests.sim.oracle import paper_rates
-from tests.sim.rigs import ALPHA, GENTLE, UNCOUPLED, UNEQUAL
+from tests.sim.rigs import ALPHA, GENTLE, REAL, UNCOUPLED, UNEQUAL
 
-REFERENCE = ROOT / 'tests' / 'data' / 'strikes.json'
-CASES, _ = read_cases(REFERENCE)
+REFERENCES = [ROOT / 'tests' / 'data' / name for name in ('strikes.json', 'strikes_rig.json')]
+CASES = [case for path in REFERENCES for case in read_cases(path)[0]]
+LISTED = [listed for path in REFERENCES for listed in json.loads(path.read_text())]
 
 
 @pytest.mark.parametrize(
     ('case', 'listed'),
-    list(zip(CASES, json.loads(REFERENCE.read_text()), strict=True)),
+    list(zip(CASES, LISTED, strict=True)),
     ids=[case.name for case in CASES],
 )
 def test_every_strike_of_the_reference_to_1e_9(case, listed):
@@ -42,10 +43,11 @@ def test_every_strike_of_the_reference_to_1e_9(case, listed):
     [
         start(preset('paper'), 0.216),
         start(UNEQUAL, 0.7),
+        start(REAL, 0.7),
         (GENTLE, State(-ALPHA, 0.3, 0.0, -0.2)),  # rocks
     ],
 )
-def test_a_strike_takes_sin2_of_2_alpha_of_that_wheel_and_nothing_else(rig, state):
+def test_a_strike_takes_the_energy_of_the_speed_that_it_does_not_keep_and_nothing_else(rig, state):
     simulation, struck = Simulation(rig, state), 0
     rig = simulation.rig
     while struck < 12:
@@ -58,8 +60,8 @@ def test_a_strike_takes_sin2_of_2_alpha_of_that_wheel_and_nothing_else(rig, stat
         wheel = (rig.front, rig.rear)[i]
         kinetic = kinetic_energy(wheel, before[2 * i + 1])
         loss = mechanical_energy(rig, before, *steps) - mechanical_energy(rig, after, *simulation.steps)
-        assert loss == pytest.approx(math.sin(2 * wheel.alpha) ** 2 * kinetic, rel=1e-12, abs=1e-12)
-        assert after[2 * i + 1] == before[2 * i + 1] * math.cos(2 * wheel.alpha)
+        assert loss == pytest.approx((1.0 - kept(wheel) ** 2) * kinetic, rel=1e-12, abs=1e-12)
+        assert after[2 * i + 1] == before[2 * i + 1] * kept(wheel)
         assert (after[2 - 2 * i], after[3 - 2 * i]) == (before[2 - 2 * i], before[3 - 2 * i])
         assert hub_distance(rig, after, stance_distance(rig, *simulation.steps)) == pytest.approx(
             hub_distance(rig, before, stance_distance(rig, *steps)), abs=1e-14

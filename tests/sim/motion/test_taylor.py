@@ -22,7 +22,7 @@ def expanded(rig, state, external_force=0.0, torques=NO_TORQUES):
     for row, value in work_parameters(rig, external_force, torques).items():
         w[row] = value
     w[S], (w[THETA1], w[OMEGA1], w[THETA2], w[OMEGA2]) = rig.S0, state
-    taylor.expand(w, 1)
+    taylor.expand(w, 1, True)
     return w
 
 
@@ -54,7 +54,7 @@ def test_every_coefficient_of_an_angle_follows_from_its_speed(rig, start):
 def test_the_series_satisfy_the_equations_of_motion_along_the_step(rig, start):
     rig, state = rig.resolved(), rolling(rig, *start)
     w = expanded(rig, state)
-    h = 0.5 * taylor.step_size(w, 0, 1e-16)
+    h = 0.5 * taylor.friction_step(w, 0, taylor.step_size(w, 0, 1e-16))
     there = State(*taylor.motion(w, h, h))
     rates = [
         np.polynomial.polynomial.polyval(h, np.polynomial.polynomial.polyder(coefficients(w, omega)))
@@ -68,7 +68,7 @@ def test_the_series_satisfy_the_equations_of_motion_along_the_step(rig, start):
 def test_the_coupler_s_series_are_its_length_and_its_pull(rig, start):
     rig, state = rig.resolved(), rolling(rig, *start)
     w = expanded(rig, state)
-    h = 0.5 * taylor.step_size(w, 0, 1e-16)
+    h = 0.5 * taylor.friction_step(w, 0, taylor.step_size(w, 0, 1e-16))
     spring = coupler(rig, State(*taylor.motion(w, h, h)), rig.S0)
     force = coupler_force(rig, spring.length, spring.rate)
     assert taylor.evaluate(w, LENGTH, 0, h) == pytest.approx(spring.length, rel=1e-12)
@@ -113,7 +113,7 @@ def test_all_lanes_of_an_array_give_what_a_list_gives_for_one():
             w[row + l] = value
         w[S + l] = UNEQUAL.resolved().S0
         w[[THETA1 + l, OMEGA1 + l, THETA2 + l, OMEGA2 + l]] = state
-    taylor.expand(w, LANES)
+    taylor.expand(w, LANES, True)
     for l, state in enumerate(states):
         alone = expanded(UNEQUAL, state)
         for series in (THETA1, OMEGA1, THETA2, OMEGA2):
