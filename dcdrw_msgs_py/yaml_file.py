@@ -64,13 +64,14 @@ class _Scalars:
 
 class _Loader(_Scalars, getattr(yaml, 'CSafeLoader', yaml.SafeLoader)):  # type: ignore[misc]
     def construct_mapping(self, node: Any, deep: bool = False) -> Any:
-        """Refuse a name that stands twice: which of the two is meant nobody knows."""
+        """Take names as text, `y` too; refuse one that stands twice: which of the two is meant nobody knows."""
         seen = set()
         for key, _ in node.value:
             if isinstance(key, yaml.ScalarNode):
                 if key.value in seen:
                     raise ValueError(f'line {key.start_mark.line + 1} has {key.value} for the second time')
                 seen.add(key.value)
+                key.tag = f'{_TAG}str'
         return super().construct_mapping(node, deep)
 
 

@@ -85,3 +85,12 @@ def test_a_file_by_opencv_is_read(tmp_path):
     path = tmp_path / 'K.yml'
     path.write_text('%YAML:1.0\n---\nK: !!opencv-matrix\n   rows: 1\n   cols: 2\n   dt: d\n   data: [ 1., 1.5e+03 ]\n')
     assert read_yaml(path) == {'K': {'rows': 1, 'cols': 2, 'dt': 'd', 'data': [1.0, 1500.0]}}
+
+
+@pytest.mark.parametrize('name', ['x', 'y', 'n', 'on', 'no', '1', '1e3', 'null'])
+def test_a_name_is_text_whatever_it_looks_like(name, tmp_path):
+    path = tmp_path / 'rig.yaml'
+    path.write_text(f'rear: {{{name}: [-0.01]}}\n')
+    assert read_yaml(path) == {'rear': {name: [-0.01]}}
+    path.write_text(yaml_text(read_yaml(path)))
+    assert read_yaml(path) == {'rear': {name: [-0.01]}}

@@ -227,7 +227,7 @@ def raw_stream(path, frames=5):
         (['--rig', 'twice.yaml'], 'rear.ids: tag 0 is mounted twice'),
         (['--rig', 'detector.yaml'], "detector must be aruco or apriltag, got 'eyes'"),
         (['--camera', 'nowhere.yaml'], 'nowhere.yaml'),
-        (['--camera', 'half.yaml'], 'half.yaml has no image_width: is it a camera_info file'),
+        (['--camera', 'half.yaml'], 'half.yaml: /** is no key of a camera file'),
         (['--camera', 'large.yaml'], 'the picture is 640x360, but the camera is calibrated for 1280x720'),
         (['nowhere.mp4'], 'there is no video nowhere.mp4'),
         (['torn.mp4'], 'torn.mp4 is no video that OpenCV reads, or it is truncated'),
