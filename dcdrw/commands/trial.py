@@ -28,22 +28,27 @@ from dcdrw.console import (
 from dcdrw.drawings.figure_files import add_formats
 from dcdrw.files import free_folder
 from dcdrw.recordings.recorder import require_libraries
-from dcdrw.suite.parameter_file import add_rig_options, chosen_params
+from dcdrw.suite.hub_gains import hub_gains
+from dcdrw.suite.parameter_file import TrialParams, add_rig_options, chosen_params
 from dcdrw.suite.processes import free_domain
 from dcdrw.trials.expectation import add_expect, expectation_status
 from dcdrw.trials.filmed_rig import filmed_rig
 from dcdrw.trials.results import describe, result, write_results
 from dcdrw.trials.simulated import Course, SimulatedTrial
 from dcdrw.trials.summary import summarize
+from dcdrw_control.sync.synchronizer import SynchronizerParams
 from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.quantity import check
 from dcdrw_msgs_py.rig import FRONT, REAR
+from dcdrw_sim.rig.simulator import SimulatedRig
 from dcdrw_tracker.gait.diagnostics import phase_text
 from dcdrw_tracker.gait.phase import PhaseParams
 
 if TYPE_CHECKING:
     from dcdrw.nodes.observer import Observer
+
+PERSON_LAWS = ('rear', 'off')
 
 _EPILOG = """\
 The nodes run on a free ROS domain that only this machine sees, unless --domain names one. DIR gets the
@@ -69,6 +74,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='phase at the start, percent of a step (default: 21.6)',
     )
     parser.add_argument('--seconds', type=positive, default=30.0, help='length of the trial (default: %(default)g)')
+    parser.add_argument(
+        '--person',
+        nargs='?',
+        const='rear',
+        choices=PERSON_LAWS,
+        metavar='LAW',
+        help='a person walks in front (parameters person.* of the simulator, in the file of --rig), and the '
+        'synchronizer drives the rear hub by its law rear (the default), or off: nobody drives it',
+    )
     parser.add_argument(
         '--camera',
         action='store_true',
@@ -102,6 +116,10 @@ def run(options: argparse.Namespace) -> int:
         )
     if params.simulator.publish_clock:
         raise ValueError('a trial runs in real time: publish_clock must be false')
+    if options.person:
+        simulator = params.simulator
+        params = params._replace(simulator=simulator._replace(person=simulator.person._replace(walks=True)))
+        SimulatedRig(params.rig, params.simulator)  # an impossible walk is told before anything runs
     start, _ = params.simulator.start(params.rig)  # an impossible start is told before anything runs
     # The joints are the simulator's, whatever the rig's own are called.
     joints = PhaseParams()
@@ -124,9 +142,26 @@ def run(options: argparse.Namespace) -> int:
         if options.domain is None:
             environment |= {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
         course = SimulatedTrial(
-            params, filmed, folder, environment, options.seconds, options.note, screen.say, screen.watch
+            params,
+            filmed,
+            folder,
+            environment,
+            options.seconds,
+            options.note,
+            screen.say,
+            screen.watch,
+            _synchronizer(params, options.person),
         ).run()
     return _finish(course, folder, options)
+
+
+def _synchronizer(params: TrialParams, law: str | None) -> SynchronizerParams | None:
+    """What acts on a pair whose front half is a person; None where nobody walks in front."""
+    if law is None:
+        return None
+    return SynchronizerParams(
+        law, hub=hub_gains(params.rig), front=params.phase.front, rear=params.phase.rear, S0=params.phase.S0
+    )
 
 
 _STYLES = {
@@ -173,9 +208,12 @@ def _finish(course: Course, folder: Path, options: argparse.Namespace) -> int:
         'agreement': describe(course.agreements),
         'diagnostics': course.diagnoses,
         **({'truth': truth._asdict()} if truth else {}),
+        **({'person_force': course.person_force._asdict()} if course.person_force else {}),
     }
     try:
-        tell(options, [summary.sentence, *([str(truth)] if truth else [])], result(trial, more))
+        tell(
+            options, [summary.sentence, *(str(one) for one in (truth, course.person_force) if one)], result(trial, more)
+        )
         write_results(trial, folder, more, formats=options.formats)
         tell_where(options, f'Written: {folder}/')
     except ValueError as error:

@@ -5,16 +5,20 @@ from contextlib import suppress
 from typing import Any
 
 from rclpy.node import Node
+from std_msgs.msg import Bool
 
 from dcdrw.suite.executables import SYNC_MONITOR
 from dcdrw_msgs_py.diagnosis import Diagnosis, PairState
 from dcdrw_msgs_py.messages import PhaseSampleReader, diagnoses, footfall
-from dcdrw_msgs_py.node import Age, listen
+from dcdrw_msgs_py.node import Age, advertise, listen, steady_clock
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import PhaseSample
-from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, PHASE_STATE, SYNC_ERROR
+from dcdrw_msgs_py.topics import DIAGNOSTICS, ENABLE, FOOTFALLS, PERSON_FORCE, PHASE_STATE, SYNC_ERROR
 from dcdrw_tracker.gait.rest import moves
 from dcdrw_tracker.gait.sync import SyncMonitor, SyncParams
+
+HEARTBEAT_SECONDS = 0.04
+"""From one enable to the next [s]."""
 
 
 class Observer(Node):
@@ -31,6 +35,8 @@ class Observer(Node):
         """The wheels have been let go."""
         self.diagnoses: dict[str, Diagnosis] = {}
         """What each node said of itself last."""
+        self.person_forces: list[float] = []
+        """The coupler's force on the person since the wheels were let go, where one walks in front [N]."""
         self.age = Age()
         self._first: PhaseSample | None = None
         self._last: PhaseSample | None = None
@@ -41,6 +47,7 @@ class Observer(Node):
             (FOOTFALLS[FRONT], lambda message: self._on_footfall(message, FRONT)),
             (FOOTFALLS[REAR], lambda message: self._on_footfall(message, REAR)),
             (DIAGNOSTICS, self._on_diagnostics),
+            (PERSON_FORCE, self._on_person_force),
         ):
             listen(self, topic, self._bearing(topic.name, callback))
 
@@ -85,6 +92,15 @@ class Observer(Node):
     def _on_footfall(self, message: Any, wheel: str) -> None:
         if self.moving:
             self.strikes[footfall(message, wheel).wheel] += 1
+
+    def _on_person_force(self, message: Any) -> None:
+        if self.moving:
+            self.person_forces.append(message.wrench.force.x)
+
+    def enable_when_moving(self) -> None:
+        """Enable the synchronizer from when the wheels have been let go, by a heartbeat."""
+        publisher = advertise(self, ENABLE)
+        self.create_timer(HEARTBEAT_SECONDS, lambda: publisher.publish(Bool(data=self.moving)), clock=steady_clock())
 
     def _on_diagnostics(self, message: Any) -> None:
         self.diagnoses |= diagnoses(message)

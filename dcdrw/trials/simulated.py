@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, NamedTuple
 from dcdrw.console import interruptible
 from dcdrw.recordings.bag_folder import RECORDING
 from dcdrw.recordings.recording import Recording
-from dcdrw.suite.executables import RECORDER, SIMULATOR, TAG_TRACKER, TRIAL, VIRTUAL_CAMERA, Executable
+from dcdrw.suite.executables import (
+    RECORDER,
+    SIMULATOR,
+    SYNCHRONIZER,
+    TAG_TRACKER,
+    TRIAL,
+    VIRTUAL_CAMERA,
+    Executable,
+)
 from dcdrw.suite.parameter_file import TrialParams, write_parameter_file
 from dcdrw.suite.processes import NodeProcess
 from dcdrw.suite.recorder_params import RecorderParams
@@ -19,6 +27,7 @@ from dcdrw.trials.agreement import Agreement
 from dcdrw.trials.analysis import Analysis, analyze
 from dcdrw.trials.filmed_rig import FilmedRig, TruthError, truth_error
 from dcdrw.trials.results import read_trial
+from dcdrw_control.sync.synchronizer import SynchronizerParams
 from dcdrw_msgs_py.diagnosis import Diagnosis, RecorderState, messages_of, parameters_of
 from dcdrw_msgs_py.rig import REAR
 from dcdrw_msgs_py.topics import FOOTFALLS, JOINT_STATES, PHASE_STATE, SYNC_ERROR
@@ -41,6 +50,17 @@ class TrialError(Exception):
     """The trial cannot go on."""
 
 
+class PersonForce(NamedTuple):
+    """The coupler's force on the person, since the wheels were let go [N]."""
+
+    peak: float
+    rms: float
+
+    def __str__(self) -> str:
+        """The force in a sentence."""
+        return f'On the person: {self.peak:.1f} N at most, {self.rms:.1f} N rms.'
+
+
 class Course(NamedTuple):
     """How a trial went, and what its record says."""
 
@@ -55,6 +75,8 @@ class Course(NamedTuple):
     """Where a camera filmed the rig."""
     diagnoses: dict[str, Diagnosis]
     """What each node said of itself last."""
+    person_force: PersonForce | None
+    """Where a person walked in front."""
 
     @property
     def end(self) -> str:
@@ -68,6 +90,7 @@ class SimulatedTrial:
     Args:
         params: of all nodes.
         filmed: camera and tracker, where these stand between the simulator and the others.
+        synchronizer: that acts on the pair, enabled from the start to the end; None: nobody does.
         folder: for the recording and what each node prints; exists.
         environment: the ROS domain of the nodes.
         seconds: how long the wheels roll, by the stamps [s].
@@ -87,10 +110,16 @@ class SimulatedTrial:
         note: str,
         say: Callable[[str], None],
         show: Callable[['Observer'], None],
+        synchronizer: SynchronizerParams | None = None,
     ) -> None:
         self._params, self._filmed, self._folder, self._environment = params, filmed, folder, environment
         self._seconds, self._note, self._say, self._show = seconds, note, say, show
-        self._executables: tuple[Executable, ...] = (*TRIAL, VIRTUAL_CAMERA, TAG_TRACKER) if filmed else TRIAL
+        self._synchronizer = synchronizer
+        self._executables: tuple[Executable, ...] = (
+            *TRIAL,
+            *((VIRTUAL_CAMERA, TAG_TRACKER) if filmed else ()),
+            *((SYNCHRONIZER,) if synchronizer else ()),
+        )
         self._nodes: list[NodeProcess] = []
         self._interrupted: list[int] = []
 
@@ -108,6 +137,8 @@ class SimulatedTrial:
             rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
             stack.callback(rclpy.try_shutdown)
             self._observer = Observer(self._params.sync)
+            if self._synchronizer:
+                self._observer.enable_when_moving()
             self._executor = StreamExecutor()
             self._executor.add_node(self._observer)
             stack.callback(self._stop_nodes)
@@ -126,7 +157,8 @@ class SimulatedTrial:
         held = self._params.simulator._replace(paused=True)
         topics = f'{TRUTH}:{JOINT_STATES.type}' if self._filmed else ''
         recorder = RecorderParams(str(self._folder / RECORDING), self._note, topics, record=True)
-        write_parameter_file((*self._params._replace(simulator=held), *(self._filmed or ()), recorder), file)
+        acting = (self._synchronizer,) if self._synchronizer else ()
+        write_parameter_file((*self._params._replace(simulator=held), *(self._filmed or ()), *acting, recorder), file)
         for node in (RECORDER, *reversed(self._executables)):  # who listens, first
             arguments = ['--ros-args', '--params-file', str(file)]
             if self._filmed and node in (SIMULATOR, VIRTUAL_CAMERA):
@@ -218,4 +250,12 @@ class SimulatedTrial:
         except (ValueError, OSError) as error:
             analysis = analyze([], self._params)
             failure = failure or str(error)
-        return Course(failure, self._interrupted, analysis, agreements, truth, self._observer.diagnoses)
+        return Course(
+            failure, self._interrupted, analysis, agreements, truth, self._observer.diagnoses, self._force_on_person()
+        )
+
+    def _force_on_person(self) -> PersonForce | None:
+        forces = self._observer.person_forces
+        if not forces:
+            return None
+        return PersonForce(max(map(abs, forces)), math.sqrt(sum(force**2 for force in forces) / len(forces)))

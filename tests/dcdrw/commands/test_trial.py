@@ -89,6 +89,17 @@ def test_trial_ends_with_summary_picture_and_sentence(tmp_path):
         assert 'Traceback' not in (tmp_path / 'out' / f'{name}.log').read_text()
 
 
+def test_a_person_s_trial_is_run_closed_loop_and_tells_the_force_on_the_person(tmp_path):
+    rig = '/**:\n  ros__parameters:\n    k: 16\n    b: 10\n    rate: 200\n'
+    process = start(tmp_path, '--person', '--seconds', '5', rig=rig)
+    output, errors = process.communicate(timeout=90)
+    assert process.returncode == 0, errors
+    force = summary(tmp_path)['person_force']
+    assert 0.0 < force['rms'] < force['peak'] < 20.0
+    assert f'On the person: {force["peak"]:.1f} N at most' in output
+    assert 'active' in (tmp_path / 'out' / 'synchronizer.log').read_text()
+
+
 def test_no_sentence_is_protocol(tmp_path):
     """Whatever the nodes say to people, a trial starts, ends and is judged by the values beside it."""
     (tmp_path / 'sitecustomize.py').write_text(MUTE)
