@@ -2,15 +2,17 @@
 
     python benchmarks/pipeline.py [--rates 100 1000] [--rounds 3] [--seconds 5]
 
-Two chains of three processes are measured at each rate in turn, round by round, on a domain of their own; the table
+Three chains are measured at each rate in turn, round by round, on a domain of their own; the table
 holds each figure's median over the rounds, and all losses:
 
 - suite: simulator → phase_estimator → sync_monitor;
+- one: simulator → estimator, monitor and synchronizer in one process (`suite`);
 - bare: three nodes that only copy a float, with the same messages, as many of them, the same QoS and executor.
 
 Latency runs from the stamp of `joint_states` to the arrival of `sync_error` in this process. Each error is matched
 to its joint state: the cores are run here again over the joint states, and give the same floats. CPU is of each
-process, user and system, in percent of one core. Goal: at most 1.5 times the bare chain's CPU and p99, nothing lost.
+process, user and system, in percent of one core. Goals: at most 1.5 times the bare chain's CPU and p99; the one
+process, without the simulator's, at most half of the bare chain's CPU and at most its p99; nothing lost.
 """
 
 import argparse
@@ -228,13 +230,25 @@ def compare(rates: list[float], rounds: int, seconds: float) -> None:
         arguments = ['--ros-args', '--log-level', 'warn', '-p', f'rate:={rate}', '-p', 'slope:=0.05']
         suite = [[sys.executable, '-m', module, *arguments] for module in SUITE]
         bare = [[sys.executable, __file__, '--bare', role, '--rates', str(rate)] for role in ROLES]
-        results = [(measure(suite, suite_errors, seconds), measure(bare, bare_errors, seconds)) for _ in range(rounds)]
-        ours, theirs = ([pair[i] for pair in results] for i in (0, 1))
+        hosted = [[sys.executable, '-m', 'dcdrw.nodes.suite', '--ros-args', '--log-level', 'warn'], suite[-1]]
+        results = [
+            (
+                measure(suite, suite_errors, seconds),
+                measure(bare, bare_errors, seconds),
+                measure(hosted, suite_errors, seconds),
+            )
+            for _ in range(rounds)
+        ]
+        ours, theirs, one = ([each[i] for each in results] for i in (0, 1, 2))
         print(row(f'suite {rate:g} Hz', ours), row(f'bare {rate:g} Hz', theirs), sep='\n', flush=True)
         p50, p99, *cpu = figures(ours) / figures(theirs)
         whole = figures(ours)[2:].sum() / figures(theirs)[2:].sum()
         each = ' + '.join(f'{ratio:4.2f}' for ratio in cpu)
         print(f'{"  ratio":18} {p50:9.2f} {p99:9.2f} {each:>20} {whole:7.2f}', flush=True)
+        print(row(f'one {rate:g} Hz', one))
+        p50, p99 = figures(one)[:2] / figures(theirs)[:2]
+        whole = figures(one)[3] / figures(theirs)[2:].sum()
+        print(f'{"  ratio":18} {p50:9.2f} {p99:9.2f} {"its process alone":>20} {whole:7.2f}', flush=True)
 
 
 if __name__ == '__main__':
