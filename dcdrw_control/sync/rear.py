@@ -14,7 +14,6 @@ from collections import deque
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid, trapezoid
 
 from dcdrw_msgs_py.quantity import Quantity
 from dcdrw_msgs_py.samples import SECOND, PhaseSample
@@ -61,6 +60,8 @@ class RearLaw:
     _acting: deque[tuple[float, float]]
 
     def __init__(self, gains: HubGains, alpha1: float, alpha2: float) -> None:
+        from scipy.integrate import cumulative_trapezoid, trapezoid  # twice a node's start-up, and seldom needed
+
         self._gains, self._alpha1, self._alpha2 = gains, alpha1, alpha2
         speeds = np.array(gains.free_speeds)
         self._angles = np.linspace(-alpha2, alpha2, len(speeds))

@@ -101,3 +101,10 @@ def test_there_is_a_function_for_every_executable():
     assert all(callable(getattr(entry, name)) for name in entry.EXECUTABLES)
     with pytest.raises(AttributeError, match='no attribute'):
         getattr(entry, 'trial')  # noqa: B009
+
+
+@pytest.mark.parametrize('name', NODES)
+def test_a_node_imports_no_library_that_few_parameters_need(name):
+    code = f'import sys, {entry.EXECUTABLES[name]}; print(*sys.modules)'
+    done = subprocess.run([sys.executable, '-c', code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert not {'scipy', 'numba', 'cv2', 'matplotlib', 'xarray', 'aiohttp', 'rich'} & set(done.stdout.split())
