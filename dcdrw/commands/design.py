@@ -14,11 +14,13 @@ from dcdrw.drawings.design_card import draw_card
 from dcdrw.drawings.figure_files import add_formats, figure_files, write_figure
 from dcdrw.files import add_force, refuse_existing, to_json, write_text
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params
+from dcdrw.trials.monitored import monitored
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.text_file import read_rows
 from dcdrw_sim.figures.style import new_figure
 from dcdrw_sim.model.scaling import nondimensional
+from dcdrw_sim.model.start import start
 from dcdrw_sim.study.design import (
     CASES,
     GRID,
@@ -37,6 +39,7 @@ from dcdrw_sim.study.design import (
     search,
 )
 from dcdrw_sim.study.sweep import default_seconds
+from dcdrw_sim.study.verdict import Verdict
 from dcdrw_tracker.gait.sync import SyncParams
 
 STIFFNESS = 1e-4, 1.0
@@ -44,11 +47,17 @@ STIFFNESS = 1e-4, 1.0
 DAMPING = 1e-2, 1e2
 MOST_PARTS = 20_000
 """Pairs of parts that are judged in minutes."""
+AFTERWARDS = 30.0
+"""The monitor sees so much more of a motion than it takes to come into step, in √(ℓ/g)."""
 FASTEST, FORGIVING, GIVEN = 'fastest', 'most forgiving', 'given'
 
 _EPILOG = """\
-Steps are those of the front wheel until the error at its strikes stays within the band, from the worst of nine initial
-phases. The fastest coupler needs fewest. The most forgiving needs fewest where k and b are each off by the tolerance
+Steps are those of the front wheel to synchronization, as the monitor counts them: until the error stays within the band
+at every instant, from the worst of nine initial phases. A coupler whose limit cycle swings beyond the band never comes
+into step. Strike steps look at the strikes of the front wheel only. Before a coupler is recommended, the monitor's own
+core has seen it come into step from each start.
+
+The fastest coupler needs fewest steps. The most forgiving needs fewest where k and b are each off by the tolerance
 either way and the slope is a tenth gentler than thought: where parts are bought by their data sheets, take this one.
 
 --available takes a table with a header: kind,value,name, a row for each part; kind is spring (value in N/m) or dashpot
@@ -60,6 +69,9 @@ examples:
   dcdrw design --available parts.csv --out design         the best pair among those on sale
   dcdrw design --k 5.25 --b 100                           judge a coupler beside the best ones
 """
+
+
+Steps = tuple[int | None, ...]
 
 
 class Part(NamedTuple):
@@ -131,8 +143,9 @@ def run(options: argparse.Namespace) -> int:
     chosen = {name: assess(task, *pair, tolerance) for name, pair in zip((FASTEST, FORGIVING), pairs, strict=True)}
     if options.k:
         chosen[GIVEN] = assess(task, options.k, options.b, tolerance)
-    found = record(task, chosen, parts, tolerance)
-    tell(options, report(task, chosen, parts, tolerance), found)
+    seen = {name: by_monitor(task, found) for name, found in chosen.items()}
+    found = record(task, chosen, seen, parts, tolerance)
+    tell(options, report(task, chosen, seen, parts, tolerance), found)
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
         write_text(options.out / 'design.json', to_json(found), options.force)
@@ -142,6 +155,21 @@ def run(options: argparse.Namespace) -> int:
         write_figure(card, options.out, 'card', options.formats, options.force)
         tell_where(options, f'\nThe card and all numbers are in {options.out}.')
     return 0
+
+
+def by_monitor(task: Task, found: Assessment) -> Steps:
+    """Steps to synchronization from each start, as the monitor's core counts them; None where it sees none."""
+    if math.isnan(found.time):  # some start never comes into step, whatever the monitor sees of the others
+        return (None,) * len(task.phases)
+    rig = task.rig._replace(k=found.k, b=found.b)
+    seconds = found.time + AFTERWARDS * nondimensional(rig)[1].time
+    params = SyncParams(band_percent=task.band_percent)
+    return tuple([monitored(*start(rig, phase), seconds, params).steps_to_synchronization for phase in task.phases])
+
+
+def recommended(found: Assessment, seen: Steps) -> bool:
+    """Whether a coupler brings the rig into step for good from each start, and the monitor agrees to the step."""
+    return found.verdict is Verdict.IN_STEP and seen == found.steps
 
 
 def read_parts(path: Path) -> list[Part]:
@@ -182,8 +210,7 @@ def _of(parts: list[Part], kind: str) -> list[Part]:
 
 def _task(options: argparse.Namespace) -> Task:
     rig = chosen_params(options).rig
-    # At a front wheel's strike p is 1/2 − θ2/2α2.
-    return Task(rig, default_seconds(rig), options.band / 100.0 * 2.0 * rig.rear.alpha)
+    return Task(rig, default_seconds(rig), options.band)
 
 
 def _bounds(options: argparse.Namespace, rig: RigParams) -> Iterator[tuple[float, float]]:
@@ -211,13 +238,24 @@ def _best_parts(task: Task, parts: list[Part], tolerance: float, bar: Bar) -> li
     return [(float(ks[index]), float(bs[index])) for index in (first, near)]
 
 
-def report(task: Task, chosen: dict[str, Assessment], parts: list[Part], tolerance: float) -> Iterator[str]:
-    """Lines for a person."""
+def report(
+    task: Task,
+    chosen: dict[str, Assessment],
+    seen: dict[str, Steps],
+    parts: list[Part],
+    tolerance: float,
+) -> Iterator[str]:
+    """Lines for a person; `seen` is what the monitor says of each."""
     yield _rig_line(task)
-    yield f'In step: within ±{_percent_of(task, task.band):g} % of 50 %, from the worst of {len(task.phases)} starts.'
+    starts = len(task.phases)
+    yield f'In step: within ±{task.band_percent:g} % of 50 % at every instant, from the worst of {starts} starts.'
     for name, found in chosen.items():
         yield ''
         yield f'{name:<16} {_coupler(task, found, parts)}'
+        if recommended(found, seen[name]):
+            yield f'  {"monitor":<14} synchronized from each of {starts} starts, in as many steps'
+        else:
+            yield f'  {"monitor":<14} NOT RECOMMENDED: not synchronized for good from each of the starts'
         for heading, content in told(task, found, tolerance):
             yield f'  {heading:<14} {content}'
 
@@ -229,6 +267,8 @@ def told(task: Task, found: Assessment, tolerance: float) -> Iterator[tuple[str,
         yield 'steps', f'{settling} of {len(found.steps)} starts come into step; the worst: {found.verdict.meaning}'
     else:
         yield 'steps', f'{found.worst_steps:.0f} from the worst start, {found.time:.1f} s'
+    if not any(map(math.isnan, found.strike_steps)):
+        yield 'strike steps', f'{max(found.strike_steps):.0f} from the worst start, looking at strikes only'
     yield (
         'from each',
         ' '.join(
@@ -239,7 +279,7 @@ def told(task: Task, found: Assessment, tolerance: float) -> Iterator[tuple[str,
         yield (
             'limit cycle',
             (
-                f'{50.0 - _percent_of(task, found.cycle_theta2):.1f} % at {found.speed:.3f} m/s; '
+                f'swings from {50.0 + found.swing[0]:.2f} to {50.0 + found.swing[1]:.2f} %, at {found.speed:.3f} m/s; '
                 f'a step leaves {100 * found.multiplier:.1f} % of a small error; '
                 f'the damper takes {found.damper_loss:.2f} J/m'
             ),
@@ -280,14 +320,20 @@ def _texts(task: Task, chosen: dict[str, Assessment], parts: list[Part], toleran
     }
 
 
-def record(task: Task, chosen: dict[str, Assessment], parts: list[Part], tolerance: float) -> dict[str, Any]:
+def record(
+    task: Task,
+    chosen: dict[str, Assessment],
+    seen: dict[str, Steps],
+    parts: list[Part],
+    tolerance: float,
+) -> dict[str, Any]:
     """Everything for a program; SI units and radians but where a name says otherwise; null where there is none."""
     scales = nondimensional(task.rig)[1]
     return {
         'parameters': {name: value for name, value in flatten(task.rig.resolved()).items() if name not in ('k', 'b')},
         'task': {
             'seconds': task.seconds,
-            'band_percent': _percent_of(task, task.band),
+            'band_percent': task.band_percent,
             'tolerance': tolerance,
             'starts_percent': [100.0 * phase for phase in task.phases],
         },
@@ -302,11 +348,14 @@ def record(task: Task, chosen: dict[str, Assessment], parts: list[Part], toleran
                     if parts and name != GIVEN
                     else {}
                 ),
+                'recommended': recommended(found, seen[name]),
+                'monitor_steps': list(seen[name]),
                 'verdict': found.verdict.name.lower(),
                 'worst_steps': _known(found.worst_steps),
                 'worst_time': _known(found.time),
                 'steps': [_known(steps) for steps in found.steps],
-                'phase_percent': _known(50.0 - _percent_of(task, found.cycle_theta2)),
+                'strike_steps': [_known(steps) for steps in found.strike_steps],
+                'swing_percent': [_known(50.0 + error) for error in found.swing],
                 'multiplier': _known(found.multiplier),
                 'speed': _known(found.speed),
                 'damper_loss': _known(found.damper_loss),
@@ -356,10 +405,6 @@ def _coupler(task: Task, found: Assessment, parts: list[Part]) -> str:
 
 def _named(parts: list[Part], kind: str, value: float) -> str:
     return next((part.name for part in parts if part.kind == kind and part.value == value), '')
-
-
-def _percent_of(task: Task, theta2: float) -> float:
-    return 100.0 * theta2 / (2.0 * task.rig.rear.alpha)
 
 
 def _margin(margin: Margin) -> str:

@@ -13,13 +13,14 @@ import numpy as np
 from dcdrw.console import Bar, cores
 from dcdrw.drawings.figure_files import add_formats, figure_files, write_figure
 from dcdrw.files import add_force, refuse_existing
+from dcdrw_msgs_py.in_step import BAND_PERCENT
 from dcdrw_sim.figures import model_figures, regime_figures, sweep_figures
 from dcdrw_sim.figures.style import COLUMN, PAGE, for_print, new_figure
 from dcdrw_sim.map.return_map import ReturnMap
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.rig.simulator import SimulatorParams
 from dcdrw_sim.source import fingerprint
-from dcdrw_sim.study.basin import SECONDS, basin, least_speeds
+from dcdrw_sim.study.regimes import BASIN_SECONDS, basin, least_speeds
 from dcdrw_sim.study.sweep import POINTS, RANGES, Axis, Sweep, papers_sweep
 from dcdrw_sim.study.sweep_dataset import open_sweep, require_extra
 from dcdrw_sim.study.sweep_run import is_complete, run_sweep
@@ -34,7 +35,7 @@ LONG, LONG_POINTS = 1000.0, 40
 SLOPES, DAMPINGS = (1.1, 2.6), (1e-2, 1e2)
 COMPUTES = ('dcdrw_msgs_py', *(f'dcdrw_sim.{room}' for room in ('model', 'motion', 'map', 'relatives', 'study')))
 """Packages on which a sweep depends."""
-EXPERIMENT_SECONDS, EXPERIMENT_BAND = 5.0, 6.0
+EXPERIMENT_SECONDS = 5.0
 
 _EPILOG = """\
 figures:
@@ -141,7 +142,7 @@ def _experiment(book: Book) -> Any:
     figure = new_figure(COLUMN, 3.6)
     rig, start = SimulatorParams().start(PAPERS_RIG)
     angles, phase = figure.subplots(2, 1, sharex=True)
-    sweep_figures.draw_experiment(angles, phase, rig, start, EXPERIMENT_SECONDS, EXPERIMENT_BAND)
+    sweep_figures.draw_experiment(angles, phase, rig, start, EXPERIMENT_SECONDS, BAND_PERCENT)
     angles.label_outer()
     return figure
 
@@ -184,9 +185,10 @@ def _basin(book: Book) -> Any:
     for axes, (k, b) in zip(figure.subplots(1, 2, sharey=True), BASINS, strict=True):
         rig = PAPERS_SWEEP._replace(k=k, b=b)
         phases = np.linspace(0.0, 1.0, points, endpoint=False)
-        found = basin(rig, phases, np.linspace(0.3, 2.0, points), SECONDS)
-        mesh = regime_figures.draw_basin(axes, rig, found, (phases, least_speeds(rig, phases, SECONDS)))
-        figure.colorbar(mesh, ax=axes, label='steps until in step')
+        found = basin(rig, phases, np.linspace(0.3, 2.0, points), BASIN_SECONDS)
+        mesh = regime_figures.draw_basin(axes, rig, found, (phases, least_speeds(rig, phases, BASIN_SECONDS)))
+        in_step = np.isfinite(found.steps).any()
+        figure.colorbar(mesh, ax=axes, label='steps to synchronization' if in_step else 'strike steps: never in step')
         axes.label_outer()
     return figure
 

@@ -10,8 +10,10 @@ import numpy as np
 from dcdrw.console import add_json, check_json, tell
 from dcdrw.files import add_force
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params
+from dcdrw_msgs_py.in_step import BAND_PERCENT
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_sim.map.limit_cycles import find_limit_cycles
 from dcdrw_sim.map.return_map import NoReturnError, ReturnMap
 from dcdrw_sim.model.dynamics import State
 from dcdrw_sim.model.scaling import nondimensional
@@ -19,8 +21,14 @@ from dcdrw_sim.model.wheel import gentlest_slope
 from dcdrw_sim.motion.ensemble import spread
 from dcdrw_sim.motion.trajectory import run as simulate
 from dcdrw_sim.relatives.even_gait import even_gait_on, even_pair, even_stall_band, gentlest_even_gait
-from dcdrw_sim.study.basin import SECONDS, judge_from, least_speeds
-from dcdrw_sim.study.regimes import gentlest_slopes, stall_bands, steepest_stall
+from dcdrw_sim.study.regimes import (
+    BASIN_SECONDS,
+    gentlest_slopes,
+    judge_from,
+    least_speeds,
+    stall_bands,
+    steepest_stall,
+)
 from dcdrw_sim.study.verdict import BAND, Verdict
 
 PHASES = tuple(np.linspace(0.0, 1.0, 25, endpoint=False).tolist())
@@ -92,6 +100,7 @@ def _limit_cycle(rig: RigParams) -> dict[str, Any] | None:
     return {
         'phase': float(return_map.phase(fixed.state)),
         'theta2': fixed.state.theta2,
+        'swing_percent': (50.0 + find_limit_cycles(spread(rig, 1, {}), np.array([fixed.state])).swings[0]).tolist(),
         'period': fixed.period,
         'velocity': rig.front.step_length / fixed.period,
         'rear_strike': rear.t / fixed.period,
@@ -106,7 +115,7 @@ def _from_every_phase(rig: RigParams, theta2: float) -> dict[str, Any] | None:
     """How many of PHASES lead within the band of the limit cycle, and from how slow starts the pair walks on."""
     if not rig.slope > gentlest_slope(rig.front, rig.rolling_resistance):
         return None
-    seconds = SECONDS * nondimensional(rig)[1].time
+    seconds = BASIN_SECONDS * nondimensional(rig)[1].time
     ends = judge_from(rig, PHASES, np.ones(len(PHASES)), seconds)
     near = (ends.verdict <= Verdict.ELSEWHERE) & (abs(ends.theta2 - theta2) <= BAND)
     least = float(least_speeds(rig, PHASES, seconds).max())
@@ -152,6 +161,10 @@ def report(rig: RigParams, found: dict[str, Any]) -> Iterator[tuple[str, str]]:
         )
         yield (
             '',
+            'within a step the phase swings from {:.2f} to {:.2f} %'.format(*cycle['swing_percent']),
+        )
+        yield (
+            '',
             f"the rear wheel strikes at {100 * cycle['rear_strike']:.2f} % of the step's time; θ2* = "
             f'{math.degrees(cycle["theta2"]):.3f}°, a phase of {100 * cycle["phase"]:.2f} %',
         )
@@ -175,8 +188,8 @@ def conditions(found: dict[str, Any]) -> dict[str, bool]:
     return {
         'there is a limit cycle': cycle is not None,
         'it is stable: every multiplier is below 1': bool(cycle and cycle['stable']),
-        f'it lies within {math.degrees(BAND):g}° of the goal: |θ2*| at the section': bool(
-            cycle and abs(cycle['theta2']) <= BAND
+        f'its swing lies within ±{BAND_PERCENT:g} % of 50 %, at every instant': bool(
+            cycle and all(abs(value - 50.0) <= BAND_PERCENT for value in cycle['swing_percent'])
         ),
         f'{lead_there} of {starts} phases lead there, both wheels on their uncoupled limit cycles{slow}': lead_there
         == starts,

@@ -10,6 +10,7 @@ from pathlib import Path
 from dcdrw.console import Bar, add_json, check_json, cores, count, positive, tell
 from dcdrw.files import add_force
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params
+from dcdrw_msgs_py.in_step import BAND_PERCENT
 from dcdrw_sim.map.regression import PHASES
 from dcdrw_sim.study.sweep import Axis, Sweep, default_axis, default_seconds
 from dcdrw_sim.study.sweep_dataset import open_sweep, require_extra
@@ -51,11 +52,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='initial phases, evenly spaced between 0 and 100 %% (default: %(default)s)',
     )
     parser.add_argument(
+        '--band',
+        type=positive,
+        default=BAND_PERCENT,
+        metavar='PERCENT',
+        help='in step is within ± this of 50 %% of a step at every instant (default: %(default)g)',
+    )
+    parser.add_argument(
         '--band-deg',
         type=positive,
         default=math.degrees(BAND),
         metavar='DEG',
-        help='|θ2| at the section is to be within this (default: %(default)g)',
+        help="the paper's condition: |θ2| at the section is to be within this (default: %(default)g)",
     )
     parser.add_argument(
         '--no-trajectories',
@@ -106,6 +114,7 @@ def chosen_sweep(options: argparse.Namespace) -> Sweep:
         options.y or default_axis('b', rig),
         options.seconds or default_seconds(rig),
         phases,
+        options.band,
         math.radians(options.band_deg),
         options.trajectories,
     )

@@ -108,13 +108,12 @@ def _draw_map(axes: Any, grid: Scores, chosen: dict[str, Assessment], on_sale: M
         ylabel='k [N/m]',
     )
     axes.legend(loc='lower left', fontsize=8)
-    axes.set_title('white: some start does not come into step; hatched: a wheel stalls', fontsize=8, loc='left')
+    axes.set_title('white: some start never comes into step for good; hatched: a wheel stalls', fontsize=8, loc='left')
 
 
 def _draw_paths(axes: Any, task: Task, chosen: dict[str, Assessment]) -> None:
     """The error at each strike of the front wheel, from every start."""
-    scale = -100.0 / (2.0 * task.rig.rear.alpha)
-    band = abs(scale) * task.band
+    scale, band = -100.0 / (2.0 * task.rig.rear.alpha), task.band_percent
     axes.axhspan(-band, band, color=BAND, alpha=0.18, linewidth=0, label=f'±{band:g} %')
     shown = 1
     for (name, found), colour, style in zip(chosen.items(), COLOURS, ('-', '--', ':'), strict=False):

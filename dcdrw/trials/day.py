@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 from dcdrw.recordings.bag_folder import find_bag
 from dcdrw.recordings.recorder import PARAMETERS
 from dcdrw.trials.analysis import Analysis
-from dcdrw.trials.decay import Decay, fit_decay
 from dcdrw.trials.results import read_trial
 from dcdrw.trials.summary import Summary, final_band, summarize
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.topics import JOINT_STATES
 from dcdrw_msgs_py.yaml_file import read_yaml
+from dcdrw_tracker.gait.contraction import Decay, fit_decay
 
 SIMULATED, MEASURED = 'simulated', 'measured'
 _FORMULA = ('=', '+', '-', '@', '\t', '\r')
@@ -49,7 +49,7 @@ TRIAL_COLUMNS: dict[str, Any] = {
     'steps_to_synchronization': lambda trial: trial.summary.steps_to_synchronization,
     'final_phase_low_percent': lambda trial: 50.0 + final_band(trial.analysis)[0],
     'final_phase_high_percent': lambda trial: 50.0 + final_band(trial.analysis)[1],
-    'contraction_per_step': lambda trial: trial.decay.ratio,
+    'contraction_per_step': lambda trial: trial.analysis.status.contraction,
     'limit_percent': lambda trial: 50.0 + trial.decay.limit,
     'k': lambda trial: trial.rig.k,
     'b': lambda trial: trial.rig.b,
@@ -81,12 +81,12 @@ def open_trial(
     analysis, _ = read_trial(path, rig=rig, topic=topic, namespace=namespace)
     bag = find_bag(path)
     folder = bag.path if bag.path.is_dir() else bag.path.parent
-    errors = analysis.status.history
+    decay = fit_decay(analysis.status.history, analysis.status.contraction)
     source = _source(folder)
     built = analysis.params.rig
     if source == MEASURED and not rig:
         built = built._replace(k=math.nan, b=math.nan, slope=math.nan)
-    return RecordedTrial(name, analysis, summarize(analysis), source, _about(bag.about), fit_decay(errors), built)
+    return RecordedTrial(name, analysis, summarize(analysis), source, _about(bag.about), decay, built)
 
 
 def table(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:

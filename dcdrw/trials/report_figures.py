@@ -63,14 +63,15 @@ def draw_decay(trial: RecordedTrial) -> Any:
     axes.axhspan(-band, band, color=BAND, alpha=0.18, linewidth=0, label=f'±{band:g} %')
     axes.axhline(0.0, color='0.85', linewidth=0.8, zorder=0)
     axes.plot(steps, errors, 'o', color=BLUE, markersize=4, label='error')
-    if not math.isnan(trial.decay.ratio):
-        fine = np.linspace(0.0, max(len(errors) - 1, 1), 400)
+    limit, start, ratio, first = trial.decay
+    if not math.isnan(limit):
+        fine = np.linspace(first, max(len(errors) - 1, 1), 400)
         axes.plot(
             fine + 1,
-            trial.decay(fine),
+            limit + start * ratio ** (fine - first),
             color=VERMILION,
             linewidth=1.2,
-            label=f'{trial.decay.limit:+.1f} % {trial.decay.start:+.1f} % · {trial.decay.ratio:.3f}ᵏ',
+            label=f'{limit:+.1f} % {start:+.1f} % · {ratio:.3f}ᵏ, of the last steps',
         )
     axes.set(xlabel='steps of the front wheel', ylabel='error [% of a step]')
     axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False, borderaxespad=0.1)

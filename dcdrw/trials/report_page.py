@@ -148,7 +148,7 @@ def _table(trials: Sequence[RecordedTrial]) -> str:
             _number(100 * trial.analysis.status.initial_phase, 1) if ran else _UNKNOWN,
             _UNKNOWN if steps is None else str(steps),
             f'{_number(50 + low, 1)} to {_number(50 + high, 1)}' if ran else _UNKNOWN,
-            _number(100 * trial.decay.ratio, 1),
+            _number(100 * trial.analysis.status.contraction, 1),
             _number(50 + trial.decay.limit, 1),
             *map(_short, (rig.k, rig.b, math.degrees(rig.slope))),
             str(samples.lost),

@@ -13,15 +13,15 @@ from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.model.wheel import gentlest_slope
 from dcdrw_sim.motion.ensemble import spread
 from dcdrw_sim.relatives.even_gait import gentlest_even_gait
-from dcdrw_sim.study.basin import Basin
-from dcdrw_sim.study.regimes import gentlest_slopes, stall_bands, steepest_stall
+from dcdrw_sim.study.regimes import Basin, gentlest_slopes, stall_bands, steepest_stall
 from dcdrw_sim.study.verdict import Verdict
 
 Floats = NDArray[np.float64]
 
 REGIMES = (
-    ('walks in step', '#86BAE0', (Verdict.SETTLES,)),
-    ('walks, undecided when time is over', '#F0E442', (Verdict.ENTERS, Verdict.UNDECIDED)),
+    ('walks in step', '#86BAE0', (Verdict.IN_STEP,)),
+    ('walks, undecided when time is over', '#F0E442', (Verdict.UNDECIDED,)),
+    ('walks about the goal, but swings beyond the band', '#A6D8C0', (Verdict.SWINGS,)),
     ('walks beside the goal', '#F4C27A', (Verdict.ELSEWHERE,)),
     ('stalls', '0.55', (Verdict.STALLS, Verdict.STANDS, Verdict.FALLS, Verdict.COLLIDES, Verdict.RACES)),
 )
@@ -47,24 +47,10 @@ def draw_coupler_regimes(axes: Any, dataset: Any, shorter: float | None = None) 
     low, high = stall_bands(spread(rig, CURVE_POINTS, {'k': ks}))
     axes.plot(ks, low.values, color=BLACK, linewidth=2, label='the limit cycle ends: fold')
     axes.plot(ks, high.values, color=BLACK, linewidth=2)
-    theta2 = np.degrees(dataset.cycle_theta2.values.T)
-    axes.contour(
-        dataset.k,
-        dataset.b,
-        abs(theta2),
-        levels=[math.degrees(dataset.attrs['band'])],
-        colors=VERMILION,
-        linestyles='--',
-        linewidths=1.5,
-    )
-    axes.plot(
-        [],
-        [],
-        '--',
-        color=VERMILION,
-        linewidth=1.5,
-        label=f'its θ₂ is ±{math.degrees(dataset.attrs["band"]):g}° at the section',
-    )
+    swing = np.maximum(abs(dataset.cycle_low.values), abs(dataset.cycle_high.values)).T
+    band = dataset.attrs['band_percent']
+    axes.contour(dataset.k, dataset.b, swing, levels=[band], colors=VERMILION, linestyles='--', linewidths=1.5)
+    axes.plot([], [], '--', color=VERMILION, linewidth=1.5, label=f'it swings to ±{band:g} % of a step from 50 %')
     if shorter:
         late = np.where(np.isfinite(dataset.time.values), dataset.time.values, 1e3 * shorter).T
         axes.contour(
@@ -120,7 +106,7 @@ def draw_slope_regimes(axes: Any, dataset: Any) -> None:
 
 
 def draw_basin(axes: Any, rig: RigParams, basin: Basin, edge: tuple[Floats, Floats]) -> Any:
-    """Steps to come into step from every phase and speed; returns what a colour bar needs.
+    """Steps to synchronization, or else strike steps, from every phase and speed; returns what a colour bar needs.
 
     Args:
         axes: matplotlib axes.
@@ -133,7 +119,8 @@ def draw_basin(axes: Any, rig: RigParams, basin: Basin, edge: tuple[Floats, Floa
 
     phases, percent = 100.0 * basin.phases, 100.0 * basin.speeds
     stalls = np.where(basin.verdicts >= Verdict.STALLS, 1.0, math.nan)
-    mesh = axes.pcolormesh(phases, percent, basin.steps.T, cmap='cividis_r', vmin=0.0, rasterized=True)
+    steps = basin.steps if np.isfinite(basin.steps).any() else basin.strike_steps
+    mesh = axes.pcolormesh(phases, percent, steps.T, cmap='cividis_r', vmin=0.0, rasterized=True)
     axes.pcolormesh(phases, percent, stalls.T, cmap=ListedColormap(['0.75']), rasterized=True)
     axes.set_xlim(0.0, phases[-1])
     axes.set_ylim(percent[0], percent[-1])

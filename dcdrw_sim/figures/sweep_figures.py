@@ -72,7 +72,7 @@ def draw_trajectories(axes: Any, dataset: Any) -> None:
         lines = [np.column_stack([steps, motion]) for motion in motions[:, start]]
         axes.add_collection(LineCollection(lines, colors=_colour(start), linewidths=0.4, alpha=0.25, rasterized=True))
         axes.plot([], [], color=_colour(start), label=f'{100 * phase:.0f} %')
-    _draw_band(axes, dataset.attrs['band'])
+    _draw_band(axes, dataset.attrs['theta2_band'])
     axes.set_xlim(0.0, max(float(np.isfinite(motions).any(axis=(0, 1)).sum()) - 1.0, 1.0))
     alpha = 180.0 / dataset.attrs['rear.spokes']
     axes.set_ylim(-alpha, alpha)
@@ -122,7 +122,7 @@ def draw_best(axes: Any, dataset: Any, form: str) -> Regression:
         axes.plot(np.degrees(predict(found, motion[0], len(motion))[:, 1]), color=_colour(start), linewidth=1.0)
     axes.plot([], [], 'o', color='0.4', markersize=3, label='simulated')
     axes.plot([], [], color='0.4', linewidth=1.0, label=f'predicted by the {form} regression')
-    _draw_band(axes, dataset.attrs['band'])
+    _draw_band(axes, dataset.attrs['theta2_band'])
     axes.set_xlabel('steps of the front wheel')
     axes.set_ylabel('θ₂ at the section [°]')
     axes.set_title(

@@ -40,6 +40,8 @@ class LimitCycles(NamedTuple):
     """A step's time [s], shape (N,)."""
     omega2: Floats
     """Speed of the rear wheel just before its strike [rad/s], shape (N,)."""
+    swings: Floats
+    """Least and greatest error 100 (p − 0.5) at any instant of a step [%], exactly, shape (N, 2)."""
 
     @property
     def found(self) -> NDArray[np.bool_]:
@@ -80,6 +82,7 @@ class _Steps(NamedTuple):
     states: Floats
     periods: Floats
     omega2: Floats
+    swings: Floats
 
 
 def find_limit_cycles(rigs: Rigs, starts: Floats) -> LimitCycles:
@@ -100,6 +103,7 @@ def find_limit_cycles(rigs: Rigs, starts: Floats) -> LimitCycles:
         np.full((count, 3, 3), math.nan),
         np.full(count, math.nan),
         np.full(count, math.nan),
+        np.full((count, 2), math.nan),
     )
     sigma1, sigma2 = rigs.front.step_length, rigs.rear.step_length
     sought = np.flatnonzero(np.isfinite(starts).all(axis=1) & (abs(sigma1 - sigma2) <= EQUAL * sigma1))
@@ -115,6 +119,7 @@ def find_limit_cycles(rigs: Rigs, starts: Floats) -> LimitCycles:
         at = sought[done]
         found.states[at], found.derivatives[at] = here[at], derivatives[done]
         found.periods[at], found.omega2[at] = there.periods[done], there.omega2[done]
+        found.swings[at] = there.swings[done]
         alive = ~done & known
         sought, change, left = sought[alive], change[alive], left[alive]
         if not sought.size:
@@ -151,7 +156,7 @@ def _linearize(rigs: Rigs, states: Floats, scales: Floats, which: NDArray[np.int
     mapped = steps.states.reshape(7, -1, 3)
     columns = (mapped[1:4] - mapped[4:]) / (2.0 * kicks.T[:, :, None])
     base = slice(len(which))
-    return _Steps(steps.states[base], steps.periods[base], steps.omega2[base]), np.moveaxis(columns, 0, 2)
+    return _Steps(*(part[base] for part in steps)), np.moveaxis(columns, 0, 2)
 
 
 def step_maps(rigs: Rigs, states: Floats, which: NDArray[np.intp]) -> _Steps:
@@ -169,10 +174,15 @@ def step_maps(rigs: Rigs, states: Floats, which: NDArray[np.intp]) -> _Steps:
         & (rear['wheel'] == 2)
         & (last['wheel'] == 1)
     )
-    result = _Steps(*(np.full(shape, math.nan) for shape in ((len(which), 3), len(which), len(which))))
+    count = len(which)
+    result = _Steps(*(np.full(shape, math.nan) for shape in ((count, 3), count, count, (count, 2))))
     at = np.flatnonzero(possible)[returns]
     result.states[at], result.periods[at] = last['state'][returns, 1:], last['t'][returns]
     result.omega2[at] = rear['state'][returns, 3]
+    # The strike of the rear wheel between the two parts of the step puts θ1/2α1 − θ2/2α2 up by a step.
+    low, high = np.minimum(rear['low'], last['low'] - 1.0), np.maximum(rear['high'], last['high'] - 1.0)
+    least = (100.0 * low[returns]) % 100.0 - 50.0
+    result.swings[at] = np.column_stack([least, least + 100.0 * (high - low)[returns]])
     return result
 
 

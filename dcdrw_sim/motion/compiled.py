@@ -4,8 +4,9 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, TypeVar
 
+from dcdrw_msgs_py import in_step
 from dcdrw_sim.model import dynamics
-from dcdrw_sim.motion import events, taylor
+from dcdrw_sim.motion import events, extremes, taylor
 from dcdrw_sim.source import fingerprint
 
 Function = TypeVar('Function', bound=Callable[..., Any])  # whatever it takes
@@ -55,5 +56,11 @@ if AVAILABLE:
         dynamics.reset,
         events.crossing,
         events.first_strike,
+        extremes.slope_of_rate,
+        extremes.turning_point,
+        extremes.phase_extremes,
+        in_step.in_step_from,
+        in_step.strikes_in_step,
+        in_step.wrapped_percent,
     ):
         register_jitable(**_OPTIONS)(_function)

@@ -31,6 +31,7 @@ from dcdrw_sim.motion.ends import (
     accept,
 )
 from dcdrw_sim.motion.events import first_strike
+from dcdrw_sim.motion.extremes import phase_extremes
 from dcdrw_sim.motion.taylor import (
     LANES,
     OMEGA1,
@@ -52,8 +53,19 @@ from dcdrw_sim.motion.taylor import (
 TOLERANCE = 5e-16
 """Last term of the angles' series at the end of a step [rad]: strikes within 1e-9 over 100 time units."""
 
-STRIKE = np.dtype([('wheel', np.int8), ('direction', np.int8), ('t', float), ('state', float, (4,))])
-"""One strike: wheel 1 or 2, direction, time [s], and the state just before it."""
+STRIKE = np.dtype(
+    [
+        ('wheel', np.int8),
+        ('direction', np.int8),
+        ('t', float),
+        ('state', float, (4,)),
+        ('low', float),
+        ('high', float),
+    ]
+)
+"""One strike: wheel 1 or 2, direction, time [s], and the state just before it; the least and the greatest phase
+difference θ1/2α1 − θ2/2α2 [steps] since the strike before or the start, these instants included. The phase p is that
+and whole steps."""
 
 STATE = (THETA1, OMEGA1, THETA2, OMEGA2)
 # Plain numbers, which compile.
@@ -88,8 +100,15 @@ TIME_OVER, STRIKES, STANDING, FALLEN, STALLED, HUBS_MET = (int(end) for end in E
     LAST2,
     ROLLED1,
     ROLLED2,
+    PITCH1,
+    PITCH2,
+    RATE,
+    RATE_AHEAD,
+    TANGENT,
+    LOW,
+    HIGH,
     SIZE,
-) = range(taylor.END, taylor.END + 27 * LANES, LANES)
+) = range(taylor.END, taylor.END + 34 * LANES, LANES)
 NEWTON_ITERATIONS = 2
 """From the error of the inverse cubic down to rounding, mostly."""
 CONVERGED = 1e-7
@@ -107,6 +126,8 @@ class Ensemble(NamedTuple):
     """`End` of each pair, or TOO_FAST, shape (N,)."""
     durations: Floats
     """Time at each pair's end [s], shape (N,)."""
+    tails: Floats
+    """The least and the greatest phase difference since each pair's last strike, as in STRIKE, shape (N, 2)."""
 
 
 def run_ensemble(
@@ -167,7 +188,11 @@ def run_pairs(
     if not (np.isfinite(starts) & (np.abs(starts) <= limits)).all():
         raise ValueError('states must be finite, their angles within ±α of their wheels')
     ensemble = Ensemble(
-        np.zeros((count, capacity), STRIKE), np.zeros(count, np.int64), np.zeros(count, np.int64), np.zeros(count)
+        np.zeros((count, capacity), STRIKE),
+        np.zeros(count, np.int64),
+        np.zeros(count, np.int64),
+        np.zeros(count),
+        np.zeros((count, 2)),
     )
     if count:
         with np.errstate(all='ignore'):
@@ -351,12 +376,28 @@ def _load(w: Table, l: int, parameters: Floats, start: Floats) -> bool:
     w[STRIDE2 + l] = -2.0 * w[taylor.L2 + l] * math.sin(w[taylor.ALPHA2 + l])
     w[SPEED1 + l], w[SPEED2 + l] = math.sqrt(w[taylor.G1 + l]), math.sqrt(w[taylor.G2 + l])
     w[UNIT + l] = 1.0 / min(w[SPEED1 + l], w[SPEED2 + l])
+    w[PITCH1 + l], w[PITCH2 + l] = 0.5 / w[taylor.ALPHA1 + l], 0.5 / w[taylor.ALPHA2 + l]
     stands = False
     for i in range(2):
         if w[STATE[2 * i + 1] + l] == 0.0 and abs(w[STATE[2 * i] + l]) >= w[taylor.ALPHA1 + i * LANES + l]:
             stands = _rest(w, l, i) or stands
             w[taylor.S + l] = _stance_distance(w, l)
+    _watch_phase(w, l)
     return stands
+
+
+@compiled
+def _watch_phase(w: Table, l: int) -> None:
+    """Begin with the extremes of the phase difference anew."""
+    w[LOW + l] = w[HIGH + l] = w[THETA1 + l] * w[PITCH1 + l] - w[THETA2 + l] * w[PITCH2 + l]
+    w[RATE + l] = w[OMEGA1 + l] * w[PITCH1 + l] - w[OMEGA2 + l] * w[PITCH2 + l]
+
+
+@compiled
+def _phase_range(w: Table, l: int) -> tuple[float, float]:
+    """The extremes of the phase difference up to now."""
+    now = w[THETA1 + l] * w[PITCH1 + l] - w[THETA2 + l] * w[PITCH2 + l]
+    return min(w[LOW + l], now), max(w[HIGH + l], now)
 
 
 @compiled
@@ -366,6 +407,7 @@ def _record(w: Table, l: int, i: int, direction: int, record: NDArray[np.void]) 
     record['wheel'], record['direction'], record['t'] = i + 1, direction, w[TIME + l]
     for j in range(4):
         record['state'][j] = w[STATE[j] + l]
+    record['low'], record['high'] = _phase_range(w, l)
 
 
 @compiled
@@ -378,6 +420,7 @@ def _strike(w: Table, l: int, i: int, direction: int) -> int:
     w[LAST1 + row], w[ROLLED1 + row] = w[TIME + l], direction
     stands = abs(w[omega]) < STANDING_SPEED * w[SPEED1 + row] and _rest(w, l, i)
     w[taylor.S + l] = _stance_distance(w, l)
+    _watch_phase(w, l)
     return FALLEN if fallen else STANDING if stands else NONE_YET
 
 
@@ -393,6 +436,7 @@ def _run(
     counts: NDArray[np.int64],
     ends: NDArray[np.int64],
     durations: Floats,
+    tails: Floats,
 ) -> None:
     """Run every pair: each lane takes the next one when its own has ended, and never waits for another."""
     w, lanes = bare(work), rows(bare(work), LANES)
@@ -406,6 +450,7 @@ def _run(
             while w[PAIR + l] == NO_PAIR and following < total:
                 if _load(w, l, parameters[following], starts[following]):
                     ends[following] = STANDING
+                    tails[following, 0], tails[following, 1] = _phase_range(w, l)
                 else:
                     w[PAIR + l] = following
                     active += 1
@@ -419,7 +464,17 @@ def _run(
                 w[REACH + l] = friction_step(w, l, w[REACH + l])
             w[STEP + l] = max(0.0, min(w[REACH + l], seconds - w[TIME + l]))
         _cut_steps(w)
-        lanes[THETA1], lanes[OMEGA1], lanes[THETA2], lanes[OMEGA2] = motion(lanes, lanes[STEP], lanes[STEP])
+        theta1, omega1, theta2, omega2 = motion(lanes, lanes[STEP], lanes[STEP])
+        lanes[RATE_AHEAD] = omega1 * lanes[PITCH1] - omega2 * lanes[PITCH2]
+        # Where it starts towards zero so fast that it may get there, the rate may change its sign twice.
+        relative = lanes[OMEGA1 + LANES] * lanes[PITCH1] - lanes[OMEGA2 + LANES] * lanes[PITCH2]
+        lanes[TANGENT] = lanes[RATE] + relative * lanes[STEP]
+        for l in range(LANES):
+            if (w[RATE + l] * w[RATE_AHEAD + l] < 0.0 or w[RATE + l] * w[TANGENT + l] < 0.0) and w[PAIR + l] != NO_PAIR:
+                least, greatest = phase_extremes(w, l, w[PITCH1 + l], w[PITCH2 + l], w[STEP + l])
+                w[LOW + l], w[HIGH + l] = min(w[LOW + l], least), max(w[HIGH + l], greatest)
+        lanes[THETA1], lanes[OMEGA1], lanes[THETA2], lanes[OMEGA2] = theta1, omega1, theta2, omega2
+        lanes[RATE] = lanes[RATE_AHEAD]
         lanes[TIME] = lanes[TIME] + lanes[STEP]
         for l in range(LANES):
             if w[PAIR + l] == NO_PAIR:
@@ -442,4 +497,5 @@ def _run(
                 end = STALLED
             if end != NONE_YET:
                 ends[mine], durations[mine], w[PAIR + l] = end, w[TIME + l], NO_PAIR
+                tails[mine, 0], tails[mine, 1] = _phase_range(w, l)
                 active -= 1

@@ -1,7 +1,8 @@
 """Choosing the coupler: search for the k and b that synchronize a rig fastest from the worst of its starts.
 
-A coupler is judged as a trial is: by the steps until θ2 at the section stays within a band, from each of several
-initial phases. The worst start counts; what does not settle from every start is ranked by what becomes of it.
+A coupler is judged as a trial is: by the steps to synchronization from each of several initial phases, and by the
+swing of its limit cycle, which has to stay within the band at every instant. The worst start counts; what does not come
+into step from every start is ranked by what becomes of it.
 """
 
 import math
@@ -13,14 +14,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dcdrw_msgs_py.in_step import BAND_PERCENT
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_sim.map.limit_cycles import losses
 from dcdrw_sim.map.regression import PHASES
 from dcdrw_sim.model.rigs import Rigs, take
 from dcdrw_sim.model.start import require_rolling
 from dcdrw_sim.model.wheel import gentlest_slope
 from dcdrw_sim.motion.ensemble import spread
-from dcdrw_sim.study.points import judge_points, run_starts, section_room, uncoupled
-from dcdrw_sim.study.verdict import Verdict, judge
+from dcdrw_sim.study.points import section_room, study, uncoupled
+from dcdrw_sim.study.verdict import Verdict
 
 Floats = NDArray[np.float64]
 
@@ -43,6 +46,8 @@ WIDEST = 8.0
 """Margins are looked for up to this factor."""
 MARGIN_STEPS = 12
 """Factors tried each way, at every look."""
+PATIENCE = 4.0
+"""So many times as long as a trial may last motions are followed to find margins."""
 LOOKS = 3
 """Each narrows down the gap that the last one found: an edge is known to about 0.1 %."""
 VARIED = ('k', 'b', 'mass', 'slope')
@@ -56,8 +61,8 @@ class Task(NamedTuple):
     """Its k and b do not matter."""
     seconds: float
     """How long a trial may last."""
-    band: float
-    """|θ2| at the section is to be within this [rad]."""
+    band_percent: float = BAND_PERCENT
+    """In step is within ± this [% of a step]."""
     phases: tuple[float, ...] = PHASES
     """Starts, in steps."""
 
@@ -71,29 +76,29 @@ class Scores(NamedTuple):
     """[N·s/m]"""
     verdict: NDArray[np.int8]
     """Of the worst start."""
-    settles: Floats
-    """Part of the starts that settle."""
+    in_step: Floats
+    """Fraction of the starts that come into step for good."""
     steps: Floats
-    """From the worst start; NaN where not every start settles."""
+    """From the worst start; NaN where not every start comes into step."""
     mean_steps: Floats
-    """Of all starts; NaN where not every one settles."""
+    """Of all starts; NaN where not every one comes into step."""
     time: Floats
-    """From the worst start [s]; NaN where not every start settles."""
+    """From the worst start [s]; NaN where not every start comes into step."""
 
     def order(self) -> NDArray[np.int64]:
         """The couplers' indices from the best to the worst."""
-        return np.lexsort((self.b, self.k, self.time, self.mean_steps, self.steps, -self.settles, self.verdict))
+        return np.lexsort((self.b, self.k, self.time, self.mean_steps, self.steps, -self.in_step, self.verdict))
 
 
 class Margin(NamedTuple):
-    """By which factors a parameter may change, the others left, with every start still settling."""
+    """By which factors a parameter may change, the others left, with every start still coming into step for good."""
 
     low: float
     high: float
     low_verdict: Verdict | None
-    """What comes of less; None where nothing does down to 1/WIDEST."""
+    """What a smaller value leads to; None where it is harmless down to 1/WIDEST."""
     high_verdict: Verdict | None
-    """What comes of more; None where nothing does up to WIDEST."""
+    """What a greater value leads to; None where it is harmless up to WIDEST."""
 
 
 class Variation(NamedTuple):
@@ -104,7 +109,7 @@ class Variation(NamedTuple):
     verdict: Verdict
     """Of the worst start."""
     steps: float
-    """From the worst start; NaN where not every start settles."""
+    """From the worst start; NaN where not every start comes into step."""
 
 
 class Assessment(NamedTuple):
@@ -114,13 +119,15 @@ class Assessment(NamedTuple):
     b: float
     verdict: Verdict
     steps: tuple[float, ...]
-    """From each start; NaN where it does not settle."""
+    """To synchronization, from each start; NaN where it never comes into step."""
+    strike_steps: tuple[float, ...]
+    """The same by the strikes of the front wheel alone; NaN where it does not stay within the band at them."""
     time: float
     """From the worst start [s]."""
     paths: Floats
     """θ2 at the sections [rad] from each start, shape (starts, sections); NaN after the last."""
-    cycle_theta2: float
-    """On the limit cycle [rad]; NaN where there is none."""
+    swing: tuple[float, float]
+    """Least and greatest error at any instant of the limit cycle [% of a step]; NaN where there is none."""
     multiplier: float
     """What a step leaves of a small error, on the limit cycle."""
     speed: float
@@ -132,7 +139,7 @@ class Assessment(NamedTuple):
 
     @property
     def worst_steps(self) -> float:
-        """From the worst start; NaN where not every start settles."""
+        """From the worst start; NaN where not every start comes into step."""
         return max(self.steps) if not any(map(math.isnan, self.steps)) else math.nan
 
 
@@ -243,18 +250,21 @@ def assess(task: Task, k: float, b: float, tolerance: float = TOLERANCE) -> Asse
 
     """
     rig = task.rig._replace(k=k, b=b)
-    found = judge_points(spread(rig, 1, {}), task.seconds, task.phases, task.band)
+    alone = spread(rig, 1, {})
+    found = study(alone, task.seconds, task.phases, task.band_percent)
+    walking = losses(alone, found.cycles)
     return Assessment(
         k,
         b,
-        Verdict(int(found['verdict'][0])),
-        tuple(found['start_steps'][0].tolist()),
-        float(found['time'][0]),
-        found['section_theta2'][0],
-        float(found['cycle_theta2'][0]),
-        float(found['multipliers'][0, 0]),
-        float(found['speed'][0]),
-        float(found['damper_loss'][0]),
+        Verdict(int(found.verdicts.max())),
+        tuple(found.steps[0].tolist()),
+        tuple(found.motions.strike_steps.tolist()),
+        float(found.times.max()),
+        found.sections.theta2,
+        (float(found.cycles.swings[0, 0]), float(found.cycles.swings[0, 1])),
+        float(abs(found.cycles.multipliers[0, 0])),
+        float(walking.speed[0]),
+        float(walking.damper[0]),
         tuple(_sensitivity(task, rig, tolerance)),
         {name: _margin(task, rig, name) for name in VARIED},
     )
@@ -268,7 +278,12 @@ def _sensitivity(task: Task, rig: RigParams, tolerance: float) -> Iterator[Varia
 
 
 def _margin(task: Task, rig: RigParams, name: str) -> Margin:
-    """Both edges, by the factors next to the coupler that spoil it; each look narrows the last one's gap."""
+    """Both edges, by the factors next to the coupler that spoil it; each look narrows the last one's gap.
+
+    Near an edge all is slow: what is left of a limit cycle holds a pair up beyond it. So motions are followed for
+    longer than trials last, and the limit cycle has the last word.
+    """
+    task = task._replace(seconds=PATIENCE * task.seconds)
     (low, below), (high, above) = (_edge(task, rig, name, limit) for limit in (1.0 / WIDEST, WIDEST))
     return Margin(low, high, below, above)
 
@@ -280,7 +295,7 @@ def _edge(task: Task, rig: RigParams, name: str, limit: float) -> tuple[float, V
     for _ in range(LOOKS):
         factors = np.geomspace(good, spoilt, MARGIN_STEPS + 1)
         verdicts = _score(task, _multiplied(rig, name, factors))[0]
-        bad = np.flatnonzero(verdicts > Verdict.SETTLES)
+        bad = np.flatnonzero(verdicts > Verdict.IN_STEP)
         if not bad.size:
             return spoilt, verdict
         first = int(bad[0])
@@ -305,8 +320,8 @@ def _score(task: Task, rigs: Rigs, report: Report = lambda count: None) -> tuple
         max(gentlest_slope(wheel, rig.rolling_resistance) for wheel in (rig.front, rig.rear)) for rig in uncoupled(rigs)
     ]
     rolling = np.flatnonzero(rigs.slope > gentlest)
-    verdict, settles = np.full(count, Verdict.STALLS, np.int8), np.zeros(count)  # what becomes of those that do not
-    columns: tuple[NDArray[Any], ...] = (verdict, settles, *(np.full(count, math.nan) for _ in range(3)))
+    verdict, in_step = np.full(count, Verdict.STALLS, np.int8), np.zeros(count)  # what becomes of those that do not
+    columns: tuple[NDArray[Any], ...] = (verdict, in_step, *(np.full(count, math.nan) for _ in range(3)))
     if rolling.size:
         room = section_room(take(rigs, rolling), task.seconds)
         pieces = np.array_split(rolling, math.ceil(rolling.size / BLOCK))
@@ -324,17 +339,14 @@ def _score(task: Task, rigs: Rigs, report: Report = lambda count: None) -> tuple
 
 
 def _score_piece(task: Task, rigs: Rigs, room: int) -> tuple[NDArray[Any], ...]:
-    pairs, ensemble = run_starts(rigs, task.seconds, task.phases, room)
-    judgement, _ = judge(ensemble, pairs, 1, task.band)
-    verdicts, steps, time = (
-        value.reshape(-1, len(task.phases)) for value in (judgement.verdict, judgement.steps, judgement.time)
-    )
+    found = study(rigs, task.seconds, task.phases, task.band_percent, room=room)
+    verdicts, steps = found.verdicts, found.steps
     return (
         verdicts.max(axis=1),
-        (verdicts == Verdict.SETTLES).mean(axis=1),
+        (verdicts == Verdict.IN_STEP).mean(axis=1),
         steps.max(axis=1),
         steps.mean(axis=1),
-        time.max(axis=1),
+        found.times.max(axis=1),
     )
 
 

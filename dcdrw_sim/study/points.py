@@ -3,13 +3,14 @@
 import math
 from collections.abc import Iterator
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dcdrw_msgs_py.in_step import BAND_PERCENT
 from dcdrw_msgs_py.rig import RigParams
-from dcdrw_sim.map.limit_cycles import LimitCycles, find_limit_cycles, losses
+from dcdrw_sim.map.limit_cycles import NEUTRAL, LimitCycles, find_limit_cycles, losses
 from dcdrw_sim.map.regression import PHASES, fit_affine, fit_raw
 from dcdrw_sim.map.return_map import Complexes, spectrum
 from dcdrw_sim.model.rigs import Rigs, rig_at, take
@@ -23,38 +24,106 @@ ROCKING = 200
 """Room for the strikes of two wheels that rock until they stand: each about ln(1e-6)/ln(cos 30°) = 96."""
 
 
-def judge_points(
-    rigs: Rigs, seconds: float, phases: tuple[float, ...] = PHASES, band: float = BAND, room: int | None = None
-) -> dict[str, NDArray[Any]]:
-    """Every variable that `dcdrw_sim.study.sweep_dataset.VARIABLES` describes, for N rigs.
+class Points(NamedTuple):
+    """What became of N rigs from each of M starts, and what the return map says of them."""
 
-    The result of a rig depends on no other.
+    motions: Judgement
+    """Each array of shape (N M,), the starts of a rig side by side: what each motion did while it was simulated."""
+    sections: Sections
+    walks: NDArray[np.bool_]
+    """Which motions come back to the section of the map: those that walk on without a slip, shape (N M,)."""
+    cycles: LimitCycles
+    """To which they tend."""
+    verdicts: NDArray[np.int8]
+    """`Verdict` for good, shape (N, M): in step only where the limit cycle is, too."""
+
+    @property
+    def steps(self) -> Floats:
+        """Steps to synchronization from each start, for good; NaN where it never is. Shape (N, M)."""
+        return self._of_those_in_step(self.motions.steps)
+
+    @property
+    def times(self) -> Floats:
+        """The same as time [s]."""
+        return self._of_those_in_step(self.motions.time)
+
+    def _of_those_in_step(self, values: Floats) -> Floats:
+        return np.where(self.verdicts == Verdict.IN_STEP, values.reshape(self.verdicts.shape), math.nan)
+
+
+def study(
+    rigs: Rigs,
+    seconds: float,
+    phases: tuple[float, ...] = PHASES,
+    band_percent: float = BAND_PERCENT,
+    theta2_band: float = BAND,
+    room: int | None = None,
+) -> Points:
+    """Judge N rigs from each of M starts, by their motions and by their limit cycles.
+
+    A motion that is within the band when the time is over is in step for good only where there is a limit cycle for
+    it to tend to, where that attracts it, and where its swing is within the band.
 
     Args:
         rigs: as `dcdrw_sim.motion.ensemble.spread` gives them.
         seconds: how long to simulate.
         phases: starts, as `ReturnMap.at_phase`: the front wheel about to strike.
-        band: |θ2| at the section is to be within this [rad].
+        band_percent: in step is within ± this [% of a step].
+        theta2_band: in place of BAND [rad].
         room: how many sections of a motion to keep; by default `section_room`.
-
-    Returns:
-        Arrays of shape (N, ...), by name; as many sections as the longest motion has.
 
     Raises:
         ValueError: an uncoupled wheel does not roll, and so no phase tells where to start.
 
     """
-    count, starts = len(rigs.k), len(phases)
+    starts = len(phases)
     room = section_room(rigs, seconds) if room is None else room
     pairs, ensemble = run_starts(rigs, seconds, phases, room)
-    judgement, sections = judge(ensemble, pairs, room, band)
+    motions, sections = judge(ensemble, pairs, room, band_percent, theta2_band)
     # What walks on without a slip comes back to the section of the map.
-    walks = (judgement.verdict <= Verdict.ELSEWHERE) & (judgement.slips == 0) & (judgement.sections > 1)
-    lasts = np.minimum(judgement.sections, room)
+    walks = (motions.verdict <= Verdict.ELSEWHERE) & (motions.slips == 0) & (motions.sections > 1)
+    lasts = np.minimum(motions.sections, room)
+    cycles = find_limit_cycles(rigs, _guesses(sections, lasts, walks, motions.verdict, starts))
+    return Points(motions, sections, walks, cycles, _for_good(motions, cycles, starts, band_percent))
+
+
+def _for_good(motions: Judgement, cycles: LimitCycles, starts: int, band_percent: float) -> NDArray[np.int8]:
+    """The verdict of each motion, as `Points.verdicts`."""
+    verdicts = motions.verdict.reshape(-1, starts)
+    swings_within = (abs(cycles.swings) <= band_percent).all(axis=1)
+    # Without a coupler every phase is a limit cycle: a multiplier is 1, and the pair stays where it is.
+    holds = swings_within & (abs(cycles.multipliers[:, 0]) <= 1.0 + NEUTRAL)
+    swings_beyond = cycles.stable & ~swings_within
+    instead = np.where(swings_beyond, Verdict.SWINGS, Verdict.UNDECIDED)[:, None]
+    return np.where((verdicts == Verdict.IN_STEP) & ~holds[:, None], instead, verdicts).astype(np.int8)
+
+
+def judge_points(
+    rigs: Rigs,
+    seconds: float,
+    phases: tuple[float, ...] = PHASES,
+    band_percent: float = BAND_PERCENT,
+    theta2_band: float = BAND,
+    room: int | None = None,
+) -> dict[str, NDArray[Any]]:
+    """Every variable that `dcdrw_sim.study.sweep_dataset.VARIABLES` describes, for N rigs; arguments as of `study`.
+
+    The result of a rig depends on no other.
+
+    Returns:
+        Arrays of shape (N, ...), by name; as many sections as the longest motion has.
+
+    Raises:
+        ValueError: as `study`.
+
+    """
+    points = study(rigs, seconds, phases, band_percent, theta2_band, room)
+    judgement, sections, walks, cycles, _ = points
+    count, starts = len(rigs.k), len(phases)
+    lasts = np.minimum(judgement.sections, sections.time.shape[1])
     longest = int(lasts.max(initial=1))
-    cycles = find_limit_cycles(rigs, _guesses(sections, lasts, walks, starts))
     return {
-        **_of_points(judgement, starts),
+        **_of_points(points),
         **_of_cycles(rigs, cycles),
         **_regressions(sections, lasts, walks, starts),
         **{f'start_{name}': value.reshape(count, starts) for name, value in judgement._asdict().items()},
@@ -109,17 +178,20 @@ def _start_states(rig: RigParams, phases: tuple[float, ...]) -> Floats:
     return starts(rig, phases)
 
 
-def _of_points(judgement: Judgement, starts: int) -> dict[str, NDArray[Any]]:
+def _of_points(points: Points) -> dict[str, NDArray[Any]]:
     """What the starts of each point have in common."""
-    verdicts, enters, steps, time = (
-        value.reshape(-1, starts) for value in (judgement.verdict, judgement.enters, judgement.steps, judgement.time)
+    verdicts, motions = points.verdicts, points.motions
+    enters, settles, strike_steps = (
+        value.reshape(verdicts.shape) for value in (motions.enters, motions.settles, motions.strike_steps)
     )
     return {
         'verdict': verdicts.max(axis=1),
-        'settles': (verdicts == Verdict.SETTLES).mean(axis=1),
+        'in_step': (verdicts == Verdict.IN_STEP).mean(axis=1),
+        'steps': points.steps.max(axis=1),
+        'time': points.times.max(axis=1),
+        'strike_steps': strike_steps.max(axis=1),
         'enters': enters.mean(axis=1),
-        'steps': steps.max(axis=1),
-        'time': time.max(axis=1),
+        'settles': settles.mean(axis=1),
     }
 
 
@@ -132,6 +204,8 @@ def _of_cycles(rigs: Rigs, cycles: LimitCycles) -> dict[str, NDArray[Any]]:
         'cycle_theta2': theta2,
         'cycle_omega2': omega2,
         'cycle_period': cycles.periods,
+        'cycle_low': cycles.swings[:, 0],
+        'cycle_high': cycles.swings[:, 1],
         'stable': cycles.stable,
         'speed': walking.speed,
         'strike_loss': walking.strikes,
@@ -165,12 +239,19 @@ def _polar(name: str, values: Complexes) -> dict[str, NDArray[Any]]:
     return {f'{name}s': np.hypot(values.real, values.imag), f'{name}_angles': np.arctan2(values.imag, values.real)}
 
 
-def _guesses(sections: Sections, lasts: NDArray[np.int64], walks: NDArray[np.bool_], starts: int) -> Floats:
-    """Where to search each point's limit cycle: the last section of the motion that changed least there."""
+def _guesses(
+    sections: Sections,
+    lasts: NDArray[np.int64],
+    walks: NDArray[np.bool_],
+    verdicts: NDArray[np.int8],
+    starts: int,
+) -> Floats:
+    """Where to search each point's limit cycle: the last section of the motion that changed least, of those in step."""
     states = np.stack([sections.omega1, sections.theta2, sections.omega2], axis=-1)
     rows = np.arange(len(lasts))
     last, before = (states[rows, np.maximum(lasts - back, 0)] for back in (1, 2))
-    change = np.where(walks, abs(last[:, 1] - before[:, 1]), math.inf).reshape(-1, starts)
+    change = abs(last[:, 1] - before[:, 1]) + np.where(verdicts == Verdict.IN_STEP, 0.0, 2.0 * math.pi)
+    change = np.where(walks, change, math.inf).reshape(-1, starts)
     best = change.argmin(axis=1)
     guesses: Floats = last.reshape(-1, starts, 3)[np.arange(len(best)), best]
     guesses[~walks.reshape(-1, starts).any(axis=1)] = math.nan

@@ -1,4 +1,4 @@
-"""Where a pair walks in step, and where it stalls: limits of existence by continuation, of verdicts by bisection.
+"""Where a pair walks, and where it stalls: limits of existence by continuation, of verdicts and basins by bisection.
 
 A limit cycle is followed along its period, with one parameter of the rig left free: from quick gaits to slow ones,
 until the parameter turns back. There the stable gait meets an unstable one and both vanish (a fold: a multiplier of
@@ -17,6 +17,7 @@ from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.map.limit_cycles import DIFFERENCE, find_limit_cycles, step_maps
 from dcdrw_sim.map.return_map import spectrum
 from dcdrw_sim.model.rigs import Rigs, rig_at, take
+from dcdrw_sim.model.start import starts
 from dcdrw_sim.motion.ensemble import run_pairs, spread
 from dcdrw_sim.relatives.even_gait import even_gait_on, even_pair, even_stall_band, gentlest_even_gait, worst_damping
 from dcdrw_sim.study.points import ROCKING, section_room
@@ -25,6 +26,9 @@ from dcdrw_sim.study.verdict import Judgement, Verdict, judge
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
+BASIN_SECONDS = 400.0
+"""How long to simulate to tell from where a pair comes into step, in √(ℓ/g)."""
+BASIN_HALVINGS = 20
 AWAY = 2.0
 """So many times the closed form's damping the limit cycle is followed from, on either side of the stall band."""
 FAR = (0.1, 10.0)
@@ -197,6 +201,80 @@ def stall_edges(
         return np.asarray((found <= Verdict.ELSEWHERE).reshape(count, each).all(axis=1))
 
     return bisect(walk, inside, outside, halvings)
+
+
+class Basin(NamedTuple):
+    """What becomes of a pair from a grid of starts: P phases, Q speeds."""
+
+    phases: Floats
+    """In steps, shape (P,)."""
+    speeds: Floats
+    """Of both wheels, as fractions of those of their uncoupled limit cycles, shape (Q,)."""
+    verdicts: NDArray[np.int8]
+    """`Verdict`, shape (P, Q)."""
+    steps: Floats
+    """To synchronization; NaN where the pair is not in step at the end. Shape (P, Q)."""
+    strike_steps: Floats
+    """The same by the strikes of the front wheel alone. Shape (P, Q)."""
+
+
+def basin(rig: RigParams, phases: ArrayLike, speeds: ArrayLike, seconds: float) -> Basin:
+    """Judge a pair from every phase at every speed.
+
+    Args:
+        rig: the rig; derived defaults are filled in.
+        phases: in steps, shape (P,), as `dcdrw_sim.model.start.starts`.
+        speeds: of both wheels, as fractions of those of their uncoupled limit cycles, shape (Q,).
+        seconds: how long to simulate.
+
+    Raises:
+        ValueError: an impossible rig, or a slope on which its wheels do not roll by themselves.
+
+    """
+    across, up = np.meshgrid(np.asarray(phases, float), np.asarray(speeds, float), indexing='ij')
+    found = judge_from(rig, across.ravel(), up.ravel(), seconds)
+    judged = (found.verdict, found.steps, found.strike_steps)
+    return Basin(across[:, 0], up[0], *(values.reshape(across.shape) for values in judged))
+
+
+def judge_from(rig: RigParams, phases: ArrayLike, speeds: ArrayLike, seconds: float) -> Judgement:
+    """What becomes of a pair from each of N phases and speeds.
+
+    Args:
+        rig: as the other arguments, those of `basin`.
+        phases: shape (N,).
+        speeds: shape (N,).
+        seconds: how long to simulate.
+
+    Raises:
+        ValueError: as `basin`.
+
+    """
+    states = starts(rig, phases, speeds)
+    return judge_starts(spread(rig, len(states), {}), states, seconds)
+
+
+def least_speeds(rig: RigParams, phases: ArrayLike, seconds: float) -> Floats:
+    """The least fraction of the limit cycles' speeds from which a pair walks on, at each phase; shape (P,).
+
+    By bisection between 0 and 1; NaN where it does not walk on from 1.
+
+    Args:
+        rig: as the other arguments, those of `basin`.
+        phases: in steps, shape (P,).
+        seconds: how long to simulate.
+
+    Raises:
+        ValueError: as `basin`.
+
+    """
+    across = np.asarray(phases, float)
+
+    def walks(speeds: Floats) -> NDArray[np.bool_]:
+        walking: NDArray[np.bool_] = judge_from(rig, across, speeds, seconds).verdict <= Verdict.ELSEWHERE
+        return walking
+
+    return bisect(walks, np.ones_like(across), np.zeros_like(across), BASIN_HALVINGS)
 
 
 def _along(rigs: Rigs, name: str, gaits: Gaits, more: Floats) -> Gaits:

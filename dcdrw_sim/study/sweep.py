@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dcdrw_msgs_py.in_step import BAND_PERCENT
 from dcdrw_msgs_py.quantity import build, flatten
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelParams
 from dcdrw_sim.map.regression import PHASES
@@ -81,8 +82,10 @@ class Sweep(NamedTuple):
     """How long to simulate."""
     phases: tuple[float, ...] = PHASES
     """Starts, in steps: as `ReturnMap.at_phase`."""
-    band: float = BAND
-    """|θ2| at the section is to be within this [rad]."""
+    band_percent: float = BAND_PERCENT
+    """In step is within ± this [% of a step]."""
+    theta2_band: float = BAND
+    """The paper's condition: |θ2| at the section is to be within this [rad]."""
     trajectories: bool = True
     """Whether to keep all states at the section."""
 
@@ -153,8 +156,11 @@ def check_sweep(sweep: Sweep) -> None:
         ValueError: one cannot, or the sweep makes no sense: the message says where and why.
 
     """
-    if not (math.isfinite(sweep.seconds) and sweep.seconds > 0.0 and math.isfinite(sweep.band) and sweep.band > 0.0):
-        raise ValueError(f'seconds and band must be > 0 and finite, got {sweep.seconds} and {sweep.band}')
+    for name in ('seconds', 'theta2_band'):
+        if not 0.0 < getattr(sweep, name) < math.inf:
+            raise ValueError(f'{name} must be > 0 and finite, got {getattr(sweep, name)}')
+    if not 0.0 < sweep.band_percent < 50.0:
+        raise ValueError(f'band_percent must be > 0 and < 50, got {sweep.band_percent}')
     if not sweep.phases or not all(0.0 <= phase < 1.0 for phase in sweep.phases):
         raise ValueError(f'phases must be in [0, 1), at least one, got {sweep.phases}')
     if both := set(targets(sweep.x.name)[0]) & set(targets(sweep.y.name)[0]):
@@ -209,7 +215,9 @@ def rigs_of(sweep: Sweep, block: Block) -> Rigs:
 def compute(sweep: Sweep, block: Block) -> dict[str, NDArray[Any]]:
     """All variables (`dcdrw_sim.study.sweep_dataset`) of the points of a block, each of shape (X, Y, ...)."""
     shape = tuple(part.stop - part.start for part in block)
-    variables = judge_points(rigs_of(sweep, block), sweep.seconds, sweep.phases, sweep.band, room(sweep))
+    variables = judge_points(
+        rigs_of(sweep, block), sweep.seconds, sweep.phases, sweep.band_percent, sweep.theta2_band, room(sweep)
+    )
     return {
         name: value.reshape(*shape, *value.shape[1:])
         for name, value in variables.items()

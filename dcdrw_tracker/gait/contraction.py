@@ -1,7 +1,8 @@
-"""Convergence per step, from the errors at successive strikes."""
+"""Convergence per step, from the errors at successive strikes: its ratio has this one estimator."""
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 WINDOW = 24
 """Steps over which the ratio is taken."""
@@ -44,3 +45,35 @@ def _centred(values: Sequence[float]) -> list[float]:
 
 def _dot(one: Sequence[float], other: Sequence[float]) -> float:
     return sum(x * y for x, y in zip(one, other, strict=True))
+
+
+class Decay(NamedTuple):
+    """Where a geometric decay of known ratio tends: e[k] = limit + start · ratio^(k − first)."""
+
+    limit: float = math.nan
+    """In the unit of the errors; NaN, as `start`, where it tends nowhere."""
+    start: float = math.nan
+    """Distance from the limit at the first error that was looked at."""
+    ratio: float = math.nan
+    first: int = 0
+    """Index of that error."""
+
+
+def fit_decay(errors: Sequence[float], ratio: float) -> Decay:
+    """The decay of a given ratio through the last WINDOW errors, by least squares.
+
+    Args:
+        errors: errors at successive strikes, oldest first [% of a step].
+        ratio: as `contraction` tells it, of the same errors.
+
+    """
+    recent = errors[-WINDOW:]
+    if not 0.0 < ratio < 1.0 or len(recent) < LEAST_STEPS:
+        return Decay(ratio=ratio)
+    powers = [ratio**step for step in range(len(recent))]
+    basis = _centred(powers)
+    start = _dot(basis, _centred(recent)) / _dot(basis, basis)
+    limit = (sum(recent) - start * sum(powers)) / len(recent)
+    if abs(limit) > 50.0:  # a straight line fits any errors with a limit far away, which no phase can have
+        return Decay(ratio=ratio)
+    return Decay(limit, start, ratio, len(errors) - len(recent))

@@ -1,13 +1,16 @@
 """The synchronization monitor: how far the pair is from walking in step, and whether it stays there (contract §1, §5).
 
-Sees only phase samples. With the paper's rig the error swings by about ±3 % within each step even when the pair
-is synchronized, and by more on the way there: so the band is judged all along, convergence from strike to strike.
+Sees only phase samples. In step is what `dcdrw_msgs_py.in_step` says, at every instant: at the samples, and at the
+strikes between them. Noise is dealt with here and nowhere else: the error is smoothed before it is held against the
+band, and once within, it may stray beyond by as much as noise explains, up to `band_hysteresis_percent`. Without noise
+the smoothed error is the error, and the hysteresis is zero.
 """
 
 import math
 from collections import deque
 from typing import Annotated, NamedTuple
 
+from dcdrw_msgs_py.in_step import BAND_PERCENT, HOLD_STEPS, in_step_from, strikes_in_step, wrapped_percent
 from dcdrw_msgs_py.quantity import Quantity
 from dcdrw_msgs_py.rig import FRONT, REAR, WheelPitch
 from dcdrw_msgs_py.rolling import phi_pitch
@@ -20,6 +23,10 @@ HISTORY = 10_000
 """Steps whose error is kept."""
 SMOOTHING = 0.05
 """Time over which the error is smoothed, along with its rate so without lag, before it is held against the band [s]."""
+NOISE_MEMORY = 1.0
+"""Time over which the noise of the error is measured [s]."""
+NOISE_SPAN = 3.0
+"""So many times the noise, as root mean square, it may carry the smoothed error beyond the band."""
 SURPRISE = 5.0
 """An error that differs by more from what its past and rate foretell is no noise [%]."""
 FASTEST = 100.0
@@ -35,14 +42,20 @@ class SyncParams(NamedTuple):
     rear: WheelPitch = WheelPitch()
     band_percent: Annotated[
         float, Quantity('the pair comes into step when the error is within this', '%', above=0.0, high=50.0, live=True)
-    ] = 6.0
+    ] = BAND_PERCENT
     band_hysteresis_percent: Annotated[
         float,
-        Quantity('and falls out of step when it is beyond by more than this', '%', low=0.0, high=50.0, live=True),
+        Quantity(
+            'and falls out of step when it is beyond by more than noise explains, or than this',
+            '%',
+            low=0.0,
+            high=50.0,
+            live=True,
+        ),
     ] = 1.0
     hold_steps: Annotated[
         int, Quantity('strikes of the front wheel within the band that make it synchronized', low=1, live=True)
-    ] = 3
+    ] = HOLD_STEPS
     stale_after: Annotated[
         float,
         Quantity('without a sample for this long the input is stale; start afresh', 's', above=0.0, live=True),
@@ -73,7 +86,7 @@ class SyncStatus(NamedTuple):
     """The wheels are held: they have not moved yet, or rest where none stays by itself."""
     synchronized: bool = False
     steps_to_synchronization: int | None = None
-    """Strikes of the front wheel up to the first within the band for good; None while not synchronized."""
+    """Strikes of the front wheel up to the one from which on the pair is in step; None while not synchronized."""
     swing_percent: tuple[float, float] = (math.nan, math.nan)
     """Least and greatest error within the last whole step of the front wheel."""
     contraction: float = math.nan
@@ -122,8 +135,8 @@ class SyncMonitor:
         self._steps = 0
         self._history: deque[float] = deque(maxlen=HISTORY)
         self._recent: deque[float] = deque(maxlen=WINDOW)
-        self._entered: int | None = None
-        self._held = 0
+        self._since = 0
+        self._noise2 = self._watched = 0.0
         self._synchronized = self._lost = False
         self._losses = self._slips = 0
         self._slipped_at: int | None = None
@@ -155,10 +168,12 @@ class SyncMonitor:
         if self._rest.update(phase):  # the time for which the wheels were held counts for no stall
             self._struck_ns = {FRONT: stamp_ns, REAR: stamp_ns}
         self._is_held = self._rest.held
-        if front_strikes or rear_strikes:
-            self._take_strikes(last, phase, front_strikes, rear_strikes)
+        if front_strikes > 0:
+            self._struck_ns[FRONT] = stamp_ns
+        if rear_strikes > 0:
+            self._struck_ns[REAR] = stamp_ns
         self._take_step_difference(n)
-        self._take_error(last, phase, front_strikes, dt)
+        self._take_error(last, phase, front_strikes, rear_strikes, dt)
         self._last = phase
         return self._sample(phase)
 
@@ -182,7 +197,7 @@ class SyncMonitor:
             steps=self._steps,
             held=self._is_held,
             synchronized=self._synchronized,
-            steps_to_synchronization=self._entered if self._synchronized else None,
+            steps_to_synchronization=self._since if self._synchronized else None,
             swing_percent=self._last_swing,
             contraction=self._contraction,
             history=tuple(self._history),
@@ -205,7 +220,7 @@ class SyncMonitor:
         self._usual = phase.step_difference, phase.step_difference
         self._swing = self._error, self._error
         self._struck_ns = {FRONT: phase.stamp_ns, REAR: phase.stamp_ns}
-        self._entered = 0 if abs(self._error) <= self.params.band_percent else None
+        self._since = in_step_from(0, 0, self._error, self._error, self.params.band_percent)
         return self._sample(phase)
 
     def _restart(self, phase: PhaseSample) -> SyncSample:
@@ -213,19 +228,6 @@ class SyncMonitor:
         self._restarts += 1
         self._cadence.jump(phase.stamp_ns)
         return self._start(phase)
-
-    def _take_strikes(self, last: PhaseSample, phase: PhaseSample, front: int, rear: int) -> None:
-        """Note the error at each forward strike of the front wheel; φ is continuous there, so it is interpolated."""
-        if front > 0:
-            self._struck_ns[FRONT] = phase.stamp_ns
-            error = self._percent(last.phi.angle)
-            change = math.remainder(self._percent(phase.phi.angle) - error, 100.0)
-            motion = phase.front.angle - last.front.angle + 2.0 * self._front_alpha * front
-            for strike in range(front):
-                share = (self._front_alpha * (1 + 2 * strike) - last.front.angle) / (motion or 1.0)
-                self._note(math.remainder(error + min(max(share, 0.0), 1.0) * change, 100.0))
-        if rear > 0:
-            self._struck_ns[REAR] = phase.stamp_ns
 
     def _note(self, error: float) -> None:
         self._history.append(error)
@@ -235,7 +237,7 @@ class SyncMonitor:
         ratio = contraction(tuple(self._recent))
         if not math.isnan(ratio):
             self._contraction = ratio
-        self._last_swing, self._swing = self._swing, (self._error, self._error)
+        self._last_swing, self._swing = self._swing, (error, error)
 
     def _take_step_difference(self, n: int) -> None:
         """n takes two neighbouring values in normal operation; where it leaves them, a wheel has slipped."""
@@ -248,36 +250,61 @@ class SyncMonitor:
             self._slipped_at = self._steps
         self._usual = max(min(low, n), n - 1), min(max(high, n), n + 1)
 
-    def _take_error(self, last: PhaseSample, phase: PhaseSample, strikes: int, dt: float) -> None:
-        """Latch after `hold_steps` strikes within ±band; unlatch beyond ±(band + hysteresis)."""
-        params = self.params
+    def _take_error(self, last: PhaseSample, phase: PhaseSample, front: int, rear: int, dt: float) -> None:
+        """Hold the error against the band: here, and at the strikes on the way."""
+        params, strikes = self.params, self._steps + front
+        edge = params.band_percent
+        if self._since <= self._steps:  # a whole step, or more, in the band
+            edge += min(params.band_hysteresis_percent, NOISE_SPAN * math.sqrt(self._noise2))
+        if front or rear:
+            foretold = self._cross(last, phase, front, rear, dt, edge)
+        else:
+            foretold = self._smooth + 50.0 * (last.phi.rate + phase.phi.rate) / self._pitch * dt
         self._error = error = self._percent(phase.phi.angle)
+        self._take_swing(error)
+        self._smooth = smooth = self._smoothed(foretold, dt)
+        self._steps = strikes
+        self._since = in_step_from(self._since, strikes, smooth, smooth, edge)
+        if self._stalled(phase.stamp_ns):
+            self._since = strikes + 1
+        if strikes_in_step(self._since, strikes) >= params.hold_steps:
+            self._synchronized, self._lost = True, False
+        elif self._synchronized and self._since > strikes:
+            self._synchronized, self._lost = False, True
+            self._losses += 1
+
+    def _cross(self, last: PhaseSample, phase: PhaseSample, front: int, rear: int, dt: float, edge: float) -> float:
+        """Take the error at each forward strike between two samples; returns the error foretold for the later one."""
+        one = _Turning.between(last.front, phase.front, front, dt, self._front_alpha)
+        other = _Turning.between(last.rear, phase.rear, rear, dt, self._rear_alpha)
+
+        def error(time: float) -> float:
+            return self._smooth + 100.0 * (one.steps(time) - other.steps(time))
+
+        step = self._steps
+        times = [(time, True) for time in one.strikes] + [(time, False) for time in other.strikes]
+        for time, is_front in sorted(times):
+            at_strike = math.remainder(error(time), 100.0)
+            self._take_swing(at_strike)
+            self._since = in_step_from(self._since, step, at_strike, at_strike, edge)
+            if is_front:  # which belongs to the step that it ends and to that which it opens
+                step += 1
+                self._since = in_step_from(self._since, step, at_strike, at_strike, edge)
+                self._note(at_strike)
+        return error(dt)
+
+    def _take_swing(self, error: float) -> None:
         low, high = self._swing
         if not low <= error <= high:
             self._swing = min(low, error), max(high, error)
-        self._smooth = self._smoothed(last, phase, dt)
-        first = self._steps + 1
-        self._steps += strikes
-        edge = params.band_percent + (params.band_hysteresis_percent if self._synchronized else 0.0)
-        if abs(self._smooth) <= edge and not self._stalled(phase.stamp_ns):
-            if self._entered is None:
-                self._entered = first
-            self._held += max(strikes, 0)
-            if self._held >= params.hold_steps:
-                self._synchronized, self._lost = True, False
-        else:
-            self._entered, self._held = None, 0
-            if self._synchronized:
-                self._synchronized, self._lost = False, True
-                self._losses += 1
 
-    def _smoothed(self, last: PhaseSample, phase: PhaseSample, dt: float) -> float:
+    def _smoothed(self, foretold: float, dt: float) -> float:
         """The error that its past and rate foretell, drawn towards the new one; the new one where they disagree."""
-        rate = 50.0 * (last.phi.rate + phase.phi.rate) / self._pitch
-        foretold = self._smooth + (rate * dt if abs(rate) <= 100.0 * FASTEST else 0.0)
-        surprise = math.remainder(self._error - foretold, 100.0)
-        if abs(surprise) > SURPRISE:
+        surprise = math.remainder(self._error - foretold, 100.0) if math.isfinite(foretold) else math.inf
+        if self._is_held or abs(surprise) > SURPRISE:
             return self._error
+        self._watched = min(self._watched + dt, NOISE_MEMORY)
+        self._noise2 += (surprise * surprise - self._noise2) * min(dt / self._watched, 1.0)
         return math.remainder(foretold + surprise * dt / (dt + SMOOTHING), 100.0)
 
     def _stalled(self, stamp_ns: int) -> tuple[str, ...]:
@@ -287,12 +314,38 @@ class SyncMonitor:
 
     def _percent(self, phi: float) -> float:
         """100 (p − 0.5), in [−50, 50)."""
-        percent = (100.0 * phi / self._pitch) % 100.0
-        return percent - 50.0 if percent < 100.0 else -50.0
+        return wrapped_percent(phi / self._pitch)
 
     def _sample(self, phase: PhaseSample) -> SyncSample:
         synchronized = self._synchronized and not self._is_held  # wheels that are held do not walk
         return SyncSample(phase.stamp_ns, self._error / 100.0 * self._pitch, self._error, synchronized)
+
+
+class _Turning(NamedTuple):
+    """How a wheel turns between two samples: at a speed before its strike and another after, or evenly."""
+
+    pitch: float
+    """2α [rad]"""
+    strikes: tuple[float, ...]
+    """Times of its forward strikes since the first sample [s]."""
+    before: float
+    """[rad/s]"""
+    after: float
+
+    @classmethod
+    def between(cls, last: Turn, now: Turn, strikes: int, dt: float, alpha: float) -> '_Turning':
+        """From both samples and the strikes between them."""
+        pitch, rate = 2.0 * alpha, last.rate
+        if strikes == 1 and 0.0 < rate <= FASTEST and 0.0 <= now.rate <= FASTEST:
+            return cls(pitch, (min((alpha - last.angle) / rate, dt),), rate, now.rate)
+        mean = (now.angle - last.angle + pitch * strikes) / dt
+        times = [(alpha - last.angle + pitch * strike) / mean for strike in range(strikes)] if mean > 0.0 else []
+        return cls(pitch, tuple([min(max(time, 0.0), dt) for time in times]), mean, mean)
+
+    def steps(self, time: float) -> float:
+        """How far it has turned by a time since the first sample [steps]."""
+        ahead = min(time, self.strikes[0]) if self.strikes else time
+        return (self.before * ahead + self.after * (time - ahead)) / self.pitch
 
 
 def _strikes(last: Turn, now: Turn, dt: float, alpha: float) -> int | None:

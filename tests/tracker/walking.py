@@ -21,17 +21,17 @@ SLOPE = math.radians(2.0)
 START_NS = 1_700_000_000_000_000_000
 
 
-def _leg() -> tuple[Array, Array]:
-    """Time and angle over one step of the limit cycle."""
+def _leg() -> tuple[Array, Array, Array]:
+    """Time, angle and speed over one step of the limit cycle."""
     after = math.cos(PITCH) ** 2 * 4 * GRAVITY_BY_LENGTH * math.sin(SLOPE) * math.sin(ALPHA) / math.sin(PITCH) ** 2
     theta = np.linspace(-ALPHA, ALPHA, 4001)
     speed = np.sqrt(after + 2 * GRAVITY_BY_LENGTH * (math.cos(SLOPE - ALPHA) - np.cos(theta + SLOPE)))
     slowness = 1 / speed
     time = np.concatenate(([0.0], np.cumsum((slowness[1:] + slowness[:-1]) / 2 * np.diff(theta))))
-    return time, theta
+    return time, theta, speed
 
 
-LEG_TIME, LEG_THETA = _leg()
+LEG_TIME, LEG_THETA, LEG_SPEED = _leg()
 STEP = float(LEG_TIME[-1])
 """Time of a step [s]."""
 
@@ -42,6 +42,11 @@ def rotation(time: Array) -> Array:
     return np.interp(time - step * STEP, LEG_TIME, LEG_THETA) + PITCH * step
 
 
+def speed(time: Array) -> Array:
+    """ψ̇ of that wheel; at a strike, after it."""
+    return np.interp(time - np.floor(time / STEP) * STEP, LEG_TIME, LEG_SPEED)
+
+
 class Walk(NamedTuple):
     """A trial's truth on a grid of times."""
 
@@ -50,6 +55,9 @@ class Walk(NamedTuple):
     front: Array
     """ψ1."""
     rear: Array
+    front_speed: Array
+    """ψ̇1 [rad/s]."""
+    rear_speed: Array
     front_strikes: Array
     """Times [s]."""
     rear_strikes: Array
@@ -67,7 +75,7 @@ class Walk(NamedTuple):
         random = np.random.default_rng(seed)
         front = self.front + np.radians(noise_deg) * random.standard_normal(self.time.size)
         rear = self.rear + np.radians(noise_deg) * random.standard_normal(self.time.size)
-        front_rate, rear_rate = np.gradient(self.front, self.time), np.gradient(self.rear, self.time)
+        front_rate, rear_rate = self.front_speed, self.rear_speed
         if not rates:
             front_rate = rear_rate = np.full(self.time.size, np.nan)
         stamps = (START_NS + np.round(self.time * 1e9).astype(np.int64)).tolist()
@@ -89,10 +97,11 @@ def walk(seconds: float, rate: float = 200.0, p0: float = 0.216, p1: float = 0.5
     def warped(at: Array) -> Array:
         return at + start + (end - start) * (1 - np.exp(-at / settle))
 
+    rear_speed = speed(warped(time)) * (1.0 + (end - start) / settle * np.exp(-time / settle))
     fine = np.linspace(0.0, seconds, 20_001)
     strikes = STEP * np.arange(1, int(seconds / STEP) + 1, dtype=np.float64)
     rear_strikes = np.interp(STEP * np.arange(1, int(warped(fine)[-1] / STEP) + 1), warped(fine), fine)
-    return Walk(time, rotation(time), rotation(warped(time)), strikes, rear_strikes)
+    return Walk(time, rotation(time), rotation(warped(time)), speed(time), rear_speed, strikes, rear_strikes)
 
 
 def keep(samples: list[JointSample], lost: float, seed: int = 0) -> list[JointSample]:

@@ -73,7 +73,7 @@ def test_the_name_of_a_kept_sweep_tells_its_parameters_and_the_code(monkeypatch)
     sweep = papers_sweep()
     assert figures._key(sweep) == figures._key(papers_sweep())
     assert figures._key(sweep) != figures._key(sweep._replace(seconds=sweep.seconds + 1e-9))
-    assert figures._key(sweep) != figures._key(sweep._replace(band=1.0))
+    assert figures._key(sweep) != figures._key(sweep._replace(band_percent=1.0))
     here = figures._key(sweep)
     monkeypatch.setattr(figures, 'fingerprint', lambda *packages: 'of other code')
     assert figures._key(sweep) != here

@@ -82,7 +82,7 @@ def test_a_sweep_tells_what_became_of_the_points(tmp_path, capsys):
         assert dataset.sizes['k'] == 2
     assert main(['sweep', '--out', str(path), *QUICK]) == 0
     assert main(['sweep', '--out', str(path), *QUICK, '--band-deg', '2']) == 2
-    assert 'differs in band' in capsys.readouterr().err
+    assert 'differs in theta2_band' in capsys.readouterr().err
 
 
 def test_a_rig_brings_its_units(tmp_path):

@@ -44,7 +44,8 @@ def test_the_contract_s_table_from_trajectories():
     assert found['stable'].all()
     assert found['raw_eigenvalues'][:, 0] == pytest.approx(1.0, abs=2e-3)
     assert (found['affine_eigenvalues'][:, 0] < 0.99).all()
-    assert found['verdict'].max() <= Verdict.UNDECIDED
+    assert found['verdict'].tolist() == [Verdict.SWINGS] * 4 + [Verdict.IN_STEP]
+    assert (abs(found['cycle_low']) > 6.0).tolist() == [True] * 4 + [False]
 
 
 def test_a_point_is_what_the_direct_functions_say():
@@ -77,13 +78,15 @@ def test_angles_and_moduli_are_those_of_complex_numbers():
 
 
 def test_what_the_starts_have_in_common():
-    found = judged(SWEEP, 100.0, (0.35, 0.5, 0.65), k=[5e-3, 1e-2, 5e-3], b=[0.15, 0.2, 1.0])
+    found = judged(SWEEP, 100.0, (0.35, 0.5, 0.65), k=[5e-3, 1e-2, 5e-3], b=[0.15, 3.0, 1.0])
     starts = found['start_verdict']
     assert found['verdict'].tolist() == starts.max(axis=1).tolist()
-    assert found['settles'].tolist() == [np.mean(row == Verdict.SETTLES) for row in starts]
+    assert found['in_step'].tolist() == [np.mean(row == Verdict.IN_STEP) for row in starts]
+    assert found['settles'].tolist() == found['start_settles'].mean(axis=1).tolist()
     assert found['enters'].tolist() == found['start_enters'].mean(axis=1).tolist()
-    assert found['settles'][1] == 1.0
+    assert found['in_step'][1] == 1.0
     assert found['steps'][1] == found['start_steps'][1].max()
+    assert found['strike_steps'][1] == found['start_strike_steps'][1].max()
     assert found['time'][1] == found['start_time'][1].max()
     assert math.isnan(found['steps'][2])  # the stall
     assert found['verdict'][2] == Verdict.STANDS
@@ -122,7 +125,8 @@ def test_units_do_not_matter(mass, length, k, b):
 
 def test_uncoupled_wheels_walk_on_at_every_phase():
     found = judged(UNCOUPLED, 20.0, (0.2, 0.45, 0.5))
-    assert found['start_verdict'][0].tolist() == [Verdict.ELSEWHERE, Verdict.ELSEWHERE, Verdict.SETTLES]
+    assert found['start_verdict'][0].tolist() == [Verdict.ELSEWHERE, Verdict.SWINGS, Verdict.SWINGS]
+    assert found['start_settles'][0].tolist() == [False, False, True]
     assert np.degrees(found['start_theta2'][0]) == pytest.approx([9.0, 1.5, 0.0], abs=1e-6)
     assert found['multipliers'][0, 0] == pytest.approx(1.0, abs=1e-6)
     assert not found['stable'][0]
@@ -131,7 +135,7 @@ def test_uncoupled_wheels_walk_on_at_every_phase():
 def test_wheels_that_step_differently_far_are_judged_but_have_no_cycle():
     found = judged(RigParams(), 20.0, **{'rear.spokes': [12.0, 14.0]})
     assert np.isfinite(found['speed']).tolist() == [True, False]
-    assert found['start_verdict'][1].min() > Verdict.SETTLES
+    assert found['verdict'][1] > Verdict.IN_STEP
 
 
 def test_there_is_room_for_every_section():

@@ -9,7 +9,7 @@ from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.map.return_map import ReturnMap
 from dcdrw_sim.model.dynamics import State, damper_power, mechanical_energy
 from dcdrw_sim.model.presets import preset
-from dcdrw_sim.model.scaling import dimensional, nondimensional
+from dcdrw_sim.model.scaling import Scales, dimensional, nondimensional
 from dcdrw_sim.model.start import starts
 from dcdrw_sim.model.wheel import gentlest_slope
 from dcdrw_sim.motion.ends import BACKWARD
@@ -17,11 +17,15 @@ from dcdrw_sim.motion.ensemble import spread
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.relatives.even_gait import even_stall_band, gentlest_even_gait
 from dcdrw_sim.relatives.rigid_pair import gentlest_slope as rigid_gentlest_slope
+from dcdrw_sim.relatives.rimless_wheel import speed_to_pass
 from dcdrw_sim.study.regimes import (
+    basin,
     bisect,
     folds,
     gentlest_slopes,
+    judge_from,
     judge_starts,
+    least_speeds,
     stall_bands,
     stall_edges,
     steepest_stall,
@@ -189,3 +193,57 @@ def test_in_the_band_strikes_and_damper_take_more_than_the_slope_gives():
     ground = (sum(last.steps) - sum(first.steps)) * rig.front.step_length * math.sin(rig.slope)
     assert damper + strikes > ground > 0.0
     assert strikes < ground  # by themselves they would not stop it
+
+
+# Basins of attraction
+
+
+SOME_PHASES, SOME_SPEEDS = np.array([0.1, 0.4, 0.5, 0.8]), np.array([0.4, 0.8, 1.0, 1.6])
+BASIN_TIME = 300.0
+
+
+def test_grid_is_that_of_the_single_motions():
+    found = basin(RIG, SOME_PHASES, SOME_SPEEDS, BASIN_TIME)
+    assert found.verdicts.shape == found.steps.shape == (4, 4)
+    assert found.phases.tolist() == SOME_PHASES.tolist()
+    assert found.speeds.tolist() == SOME_SPEEDS.tolist()
+    alone = judge_from(RIG, [0.4], [1.6], BASIN_TIME)
+    assert (found.verdicts[1, 3], found.strike_steps[1, 3]) == (alone.verdict[0], alone.strike_steps[0])
+
+
+def test_every_phase_leads_to_the_limit_cycle_but_not_every_speed():
+    found = basin(RIG, SOME_PHASES, SOME_SPEEDS, BASIN_TIME)
+    assert (found.verdicts[:, 1:] == Verdict.SWINGS).all()
+    assert (found.verdicts[:, 0] >= Verdict.STALLS).all()
+    assert np.isfinite(found.strike_steps[:, 1:]).all()
+    assert np.isnan(found.strike_steps[:, 0]).all()
+    assert np.isnan(found.steps).all()  # its limit cycle swings by ±7 %
+    damped = basin(RIG._replace(b=3.0), SOME_PHASES, [1.0], BASIN_TIME)
+    assert np.isfinite(damped.steps).all()
+
+
+def test_least_speed_parts_what_walks_from_what_rocks_back():
+    edge = least_speeds(RIG, SOME_PHASES, BASIN_TIME)
+    assert ((edge > 0.6) & (edge < 0.8)).all()
+    for part, walks in ((1.001, True), (0.999, False)):
+        motion = run(RIG, State(*starts(RIG, SOME_PHASES[1], edge[1] * part).tolist()), 60.0)
+        assert all(strike.direction != BACKWARD for strike in motion.strikes) == walks
+
+
+def test_both_wheels_together_are_one_wheel():
+    """At p = 0 nothing moves the coupler but what is left of its preload: the single wheel's closed form."""
+    rig = RIG._replace(D0=RIG.resolved().S0)
+    needed = speed_to_pass(rig.front, rig.slope, rig.gravity, -rig.front.alpha)
+    after_strike = starts(rig, 0.0)[1] * math.cos(2.0 * rig.front.alpha)
+    assert least_speeds(rig, [0.0], BASIN_TIME) == pytest.approx(needed / after_strike, rel=1e-5)
+
+
+def test_a_basin_has_no_units():
+    scales = Scales(length=0.9, mass=7.0, gravity=9.81)
+    rig = dimensional(RIG, scales)
+    found = least_speeds(rig, SOME_PHASES[:2], BASIN_TIME * scales.time)
+    assert found == pytest.approx(least_speeds(RIG, SOME_PHASES[:2], BASIN_TIME), abs=2e-6)
+
+
+def test_in_the_stall_band_no_speed_helps():
+    assert np.isnan(least_speeds(RIG._replace(b=0.9), SOME_PHASES[:2], BASIN_TIME)).all()

@@ -150,8 +150,9 @@ def test_what_is_no_axis_is_refused(text, message):
 @pytest.mark.parametrize(
     ('change', 'message'),
     [
-        ({'seconds': 0.0}, 'seconds and band'),
-        ({'band': math.nan}, 'seconds and band'),
+        ({'seconds': 0.0}, 'seconds must be'),
+        ({'theta2_band': math.nan}, 'theta2_band must be'),
+        ({'band_percent': 50.0}, 'band_percent must be'),
         ({'phases': ()}, 'phases must be'),
         ({'phases': (1.0,)}, 'phases must be'),
         ({'x': Axis('b', (1.0,))}, 'both axes set b'),
@@ -161,7 +162,7 @@ def test_what_is_no_axis_is_refused(text, message):
         ({'x': Axis('k', (math.nan,))}, 'all finite'),
         ({'x': Axis('k', (1.0, 1.0))}, 'k has a value twice'),
         ({'x': Axis('k', (1.0, -1.0))}, 'k must be ≥ 0'),
-        ({'y': Axis('b', (1.0, 1e9))}, 'b must be ≤'),
+        ({'y': Axis('b', (1.0, 1e9))}, 'b must be'),
         ({'x': Axis('slope_deg', (2.0, 0.5))}, 'too gentle'),
         ({'x': Axis('none', (1.0,))}, 'no parameter'),
     ],

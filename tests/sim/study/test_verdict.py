@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dcdrw_msgs_py.in_step import HOLD_STEPS
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.map.regression import steps_to_stay
 from dcdrw_sim.map.return_map import ReturnMap
@@ -22,7 +23,7 @@ from tests.sim.rigs import ALPHA, GENTLE, UNCOUPLED, between
 SWEEP = preset('paper-sweep').resolved()
 
 
-def walk(theta2_deg, end=End.TIME, late=1.0, rocked=None):
+def walk(theta2_deg, end=End.TIME, late=1.0, rocked=None, swing=0.0):
     """A pair that walks with these θ2 at the sections, one step per second; backward strikes at section `rocked`."""
     strikes = []
     for k, theta2 in enumerate(theta2_deg):
@@ -30,8 +31,14 @@ def walk(theta2_deg, end=End.TIME, late=1.0, rocked=None):
             strikes += [(2, -1, k - 0.6, (0.0, 1.0, -ALPHA, -1.0)), (2, 1, k - 0.55, (0.0, 1.0, ALPHA, 1.0))]
         strikes += [(2, 1, k - 0.5, (0.0, 1.0, ALPHA, 1.1)), (1, 1, float(k), (ALPHA, 1.2, math.radians(theta2), 1.3))]
     strikes = strikes[1:]  # from the first section on
-    records = np.array([strikes], STRIKE)
-    return Ensemble(records, np.array([len(strikes)]), np.array([end]), np.array([len(theta2_deg) - 1 + late]))
+    # As if the phase went straight from strike to strike, but for a swing to either side of the goal.
+    records, phase = np.zeros((1, len(strikes)), STRIKE), 0.5 - math.radians(theta2_deg[0]) / (2 * ALPHA)
+    for record, (wheel, direction, t, state) in zip(records[0], strikes, strict=True):
+        before, phase = phase, 0.5 - state[2] / (2 * ALPHA) if wheel == 1 else 0.5
+        record['wheel'], record['direction'], record['t'], record['state'] = wheel, direction, t, state
+        record['low'], record['high'] = min(before, phase, 0.5 - swing / 100), max(before, phase, 0.5 + swing / 100)
+    tail = np.array([[0.5, 0.5]])
+    return Ensemble(records, np.array([len(strikes)]), np.array([end]), np.array([len(theta2_deg) - 1 + late]), tail)
 
 
 def judged(*arguments, capacity=50, **options):
@@ -42,29 +49,33 @@ def judged(*arguments, capacity=50, **options):
 # Verdicts
 
 OUT, IN = [9.0, 7.0, 5.0, 3.0], [0.9, 0.5, -0.3, 0.2, 0.1]
+"""θ2 at the section [°]; ±6 % of a step are ±1.8°."""
 
 
 @pytest.mark.parametrize(
     ('theta2', 'options', 'verdict'),
     [
-        (OUT + IN, {}, Verdict.SETTLES),
-        (IN[:1] * HOLD, {}, Verdict.SETTLES),
-        (OUT + IN[1:], {}, Verdict.ENTERS),  # not long enough
-        ([*OUT, *IN, 1.1], {}, Verdict.ENTERS),
+        (OUT + IN, {}, Verdict.IN_STEP),
+        (IN[:1] * (HOLD_STEPS + 1), {}, Verdict.IN_STEP),
+        (OUT + IN[3:], {}, Verdict.UNDECIDED),  # not long enough
+        ([*OUT, *IN, 1.9], {}, Verdict.UNDECIDED),
+        (OUT + IN, {'swing': 6.1}, Verdict.UNDECIDED),
+        ([*OUT, *IN, *[0.2] * (HOLD + 1)], {'swing': 6.1}, Verdict.SWINGS),
+        ([*OUT, *IN, *[0.2] * (HOLD + 1)], {'swing': 5.9}, Verdict.IN_STEP),
         ([*OUT, -3.0, -4.0, -3.5, -3.2, -3.3], {}, Verdict.UNDECIDED),  # across the band, but never seen within
         ([4.0] * (HOLD + 1), {}, Verdict.ELSEWHERE),
-        ([*OUT, *IN, *[1.2] * (HOLD + 1)], {}, Verdict.ELSEWHERE),
+        ([*OUT, *IN, *[1.9] * (HOLD + 1)], {}, Verdict.ELSEWHERE),
         ([15.0, -15.0] * HOLD, {}, Verdict.ELSEWHERE),  # both strike at one instant: before or after, by a hair
         (OUT + IN, {'rocked': 6}, Verdict.STALLS),
-        ([9.0, *OUT, *IN], {'rocked': 1}, Verdict.SETTLES),  # long ago
+        ([9.0, *OUT, *IN], {'rocked': 1}, Verdict.IN_STEP),  # long ago
         (OUT + IN, {'late': 3.5}, Verdict.STALLS),
         (OUT + IN, {'end': End.STALLED}, Verdict.STALLS),
         (OUT + IN, {'end': End.STANDING}, Verdict.STANDS),
         (OUT + IN, {'end': End.FALLEN}, Verdict.FALLS),
         (OUT + IN, {'end': End.HUBS_MET}, Verdict.COLLIDES),
         (OUT + IN, {'end': TOO_FAST}, Verdict.RACES),
-        (OUT + IN, {'end': End.STRIKES, 'late': 0.0}, Verdict.SETTLES),
-        ([0.0], {}, Verdict.ENTERS),
+        (OUT + IN, {'end': End.STRIKES, 'late': 0.0}, Verdict.IN_STEP),
+        ([0.0], {}, Verdict.UNDECIDED),
         ([9.0], {}, Verdict.UNDECIDED),
     ],
 )
@@ -75,11 +86,11 @@ def test_verdict(theta2, options, verdict):
 def test_every_verdict_has_a_meaning_and_the_worst_is_the_largest():
     assert len({verdict.meaning for verdict in Verdict}) == len(Verdict)
     assert list(Verdict) == sorted(Verdict)
-    assert Verdict.SETTLES < Verdict.ENTERS < Verdict.ELSEWHERE < Verdict.STALLS < Verdict.STANDS
+    assert Verdict.IN_STEP < Verdict.UNDECIDED < Verdict.SWINGS < Verdict.ELSEWHERE < Verdict.STALLS < Verdict.STANDS
 
 
 def test_a_motion_of_no_strike_is_undecided():
-    nothing = Ensemble(np.zeros((1, 4), STRIKE), np.array([0]), np.array([End.TIME]), np.array([0.1]))
+    nothing = Ensemble(np.zeros((1, 4), STRIKE), np.array([0]), np.array([End.TIME]), np.array([0.1]), np.zeros((1, 2)))
     judgement, sections = judge(nothing, spread(RigParams(), 1, {}), 3)
     assert judgement.verdict[0] == Verdict.UNDECIDED
     assert math.isnan(judgement.theta2[0])
@@ -98,25 +109,35 @@ def test_enters_is_told_whatever_comes_after():
 
 
 @given(st.lists(between(-3.0, 3.0), min_size=HOLD + 2, max_size=20))
-def test_steps_are_those_until_theta2_stays(theta2):
+def test_settling_is_staying_within_the_band_at_the_last_sections(theta2):
     judgement, _ = judged(theta2)
     steps = steps_to_stay(np.radians(theta2), 0.0)
     inside = np.abs(np.radians(theta2)) <= BAND
     assert judgement.enters == inside.any()
-    if judgement.verdict == Verdict.SETTLES:
-        assert (judgement.steps, judgement.time) == (steps, steps)
-        assert inside[-HOLD:].all()
-    else:
-        assert math.isnan(judgement.steps)
-        assert not inside[-HOLD:].all()
+    assert judgement.settles == inside[-HOLD:].all()
+    assert judgement.steps_to_settle == pytest.approx(steps if judgement.settles else math.nan, nan_ok=True)
     if inside.any():
         assert judgement.steps_to_enter == np.argmax(inside)
 
 
+# In step
+
+
+@given(st.lists(between(-5.0, 5.0), min_size=HOLD_STEPS + 1, max_size=20), between(0.0, 5.0))
+def test_steps_are_counted_to_the_strike_that_opens_the_first_step_wholly_inside_for_good(theta2, swing):
+    judgement, _ = judged(theta2, swing=swing)
+    outside = np.abs(np.radians(theta2)) > 0.06 * 2 * ALPHA
+    last = int(np.flatnonzero(outside)[-1]) if outside.any() else -1  # this strike ends one step and opens another
+    in_step = len(theta2) - 1 - last >= HOLD_STEPS + (last < 0)
+    assert judgement.steps == pytest.approx(last + 1 if in_step else math.nan, nan_ok=True)
+    assert judgement.strike_steps == pytest.approx(judgement.steps, nan_ok=True)
+    assert judgement.time == pytest.approx(judgement.steps, nan_ok=True)
+
+
 def test_a_wider_band_is_entered_no_later():
     ensemble, rigs = walk(OUT + IN), spread(RigParams(), 1, {})
-    steps = [float(judge(ensemble, rigs, 50, math.radians(band))[0].steps[0]) for band in (1.0, 4.0, 8.0, 10.0)]
-    assert steps == [4, 3, 1, 0]
+    steps = [float(judge(ensemble, rigs, 50, band)[0].steps[0]) for band in (3.0, 12.0, 20.0, 40.0)]
+    assert steps == [4, 3, 2, 0]
 
 
 # Sections
@@ -154,7 +175,7 @@ def test_a_slipped_step_is_told_and_lengthens_the_coupler():
 
 def test_what_there_is_no_room_for_is_still_judged():
     judgement, sections = judged(OUT + IN, capacity=2)
-    assert judgement.verdict == Verdict.SETTLES
+    assert judgement.verdict == Verdict.IN_STEP
     assert judgement.sections == 9
     assert sections.time.tolist() == [[0.0, 1.0]]
 
@@ -165,14 +186,21 @@ def test_what_there_is_no_room_for_is_still_judged():
 def test_verdicts_of_motions_that_are_known():
     start = (SWEEP.front.alpha, *ReturnMap(SWEEP).at_phase(0.3))
     rigs = spread(
-        SWEEP, 4, {'b': [0.15, 1.0, 0.0, 0.15], 'k': [5e-3, 5e-3, 0.0, 5e-3], 'slope': [SWEEP.slope] * 3 + [-0.02]}
+        SWEEP,
+        5,
+        {
+            'b': [3.0, 1.0, 0.0, 0.15, 0.15],
+            'k': [5e-3, 5e-3, 0.0, 5e-3, 5e-3],
+            'slope': [SWEEP.slope] * 3 + [-0.02, SWEEP.slope],
+        },
     )
-    judgement, _ = judge(run_pairs(rigs, [start] * 4, 200.0, 1000), rigs, 200)
+    judgement, _ = judge(run_pairs(rigs, [start] * 5, 200.0, 1000), rigs, 200)
     assert [*map(Verdict, judgement.verdict)] == [
-        Verdict.SETTLES,
+        Verdict.IN_STEP,
         Verdict.STANDS,
         Verdict.ELSEWHERE,
         Verdict.STANDS,
+        Verdict.SWINGS,
     ]  # uncoupled wheels keep their phase
 
 

@@ -1,4 +1,5 @@
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -82,7 +83,7 @@ def test_a_pair_that_settles_outside_the_band_is_never_synchronized() -> None:
     assert run(phases(20.0, p1=0.4), SyncParams(band_percent=15.0))[0].status().synchronized
 
 
-def test_leaving_the_band_and_its_hysteresis_loses_synchronization() -> None:
+def test_leaving_the_band_loses_synchronization() -> None:
     monitor = SyncMonitor(SyncParams())
     turning = phases(20.0, IN_STEP, 0.9, settle=2.0)
     seen = [(sync.synchronized, sync.error_percent) for sync in map(monitor.update, turning) if sync]
@@ -90,17 +91,33 @@ def test_leaving_the_band_and_its_hysteresis_loses_synchronization() -> None:
     assert not any(synchronized for synchronized, _ in seen)
     monitor = SyncMonitor(SyncParams(hold_steps=1, band_percent=6.0))
     drifting = filter(None, map(monitor.update, phases(20.0, IN_STEP, 0.9, 8.0)))
-    assert max(sync.error_percent for sync in drifting if sync.synchronized) == pytest.approx(7.0, abs=0.3)
+    assert max(sync.error_percent for sync in drifting if sync.synchronized) == pytest.approx(6.0, abs=0.3)
     status = monitor.status()
     assert (status.synchronized, status.lost, status.steps_to_synchronization) == (False, True, None)
     assert status.losses > 0
 
 
+@pytest.mark.parametrize('hysteresis', [0.0, 1.0, 40.0])
+def test_without_noise_the_hysteresis_changes_nothing(hysteresis: float) -> None:
+    params = SyncParams(hold_steps=1, band_hysteresis_percent=hysteresis)
+    drifting = phases(20.0, IN_STEP, 0.9, 8.0)
+    plain = run(drifting, params._replace(band_hysteresis_percent=0.0))[1]
+    assert run(drifting, params)[1] == plain
+
+
+def test_noise_may_carry_the_error_beyond_the_band_by_the_hysteresis_and_no_further() -> None:
+    monitor = SyncMonitor(SyncParams(hold_steps=1))
+    drifting = [sync for sync in map(monitor.update, phases(20.0, IN_STEP, 0.9, 8.0, noise_deg=0.3)) if sync]
+    left = next(now for last, now in pairwise(drifting) if last.synchronized and not now.synchronized)
+    assert left.error_percent == pytest.approx(7.0, abs=1.5)
+    assert monitor.status().losses > 0
+
+
 def test_errors_at_strikes_are_interpolated() -> None:
-    truth = walk(10.0)
+    truth = walk(10.0, 100_000.0)
     history = run(phases(10.0))[0].status().history
     expected = np.interp(truth.front_strikes, truth.time, 100 * truth.phase() - 50)
-    assert history == pytest.approx(expected.tolist(), abs=0.02)
+    assert history == pytest.approx(expected.tolist(), abs=5e-3)
 
 
 @pytest.mark.parametrize('noise_deg', [0.0, 0.2])
@@ -166,7 +183,10 @@ def test_a_pair_that_is_held_is_not_stalled_and_goes_on_where_it_was() -> None:
         monitor.update(phase)
         assert monitor.status().stalled == ()
     plain, _ = run(SETTLED)
-    assert monitor.status()._replace(stamp_ns=0, cadence=None) == plain.status()._replace(stamp_ns=0, cadence=None)
+    one, other = monitor.status(), plain.status()
+    assert one.history == pytest.approx(other.history, abs=1e-3)
+    aside = other._asdict() | {'stamp_ns': 0, 'cadence': None, 'history': (), 'contraction': 0.0}
+    assert one._replace(stamp_ns=0, cadence=None, history=(), contraction=0.0)._asdict() == aside
 
 
 @pytest.mark.parametrize(
