@@ -13,7 +13,7 @@ from dcdrw.suite.parameter_file import add_rig_options, chosen_params
 from dcdrw_msgs_py.in_step import BAND_PERCENT
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import RigParams
-from dcdrw_sim.map.limit_cycles import find_limit_cycles
+from dcdrw_sim.map.limit_cycles import find_limit_cycles, search_fixed_point
 from dcdrw_sim.map.return_map import NoReturnError, ReturnMap
 from dcdrw_sim.model.dynamics import State
 from dcdrw_sim.model.scaling import nondimensional
@@ -91,7 +91,7 @@ def record(rig: RigParams) -> dict[str, Any]:
 def _limit_cycle(rig: RigParams) -> dict[str, Any] | None:
     return_map = ReturnMap(rig)
     try:
-        fixed = return_map.fixed_point()
+        fixed = search_fixed_point(return_map)
     except (NoReturnError, ValueError):
         return None
     pair = even_pair(rig)

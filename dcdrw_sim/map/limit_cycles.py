@@ -5,17 +5,27 @@ motion, with an error of about 1e-9, thousands of pairs in the time of one by th
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dcdrw_msgs_py.values import each
-from dcdrw_sim.map.return_map import PROGRESS, SINGULAR, TOLERANCE, Complexes, spectrum
+from dcdrw_sim.map.return_map import (
+    PROGRESS,
+    SINGULAR,
+    TOLERANCE,
+    Complexes,
+    FixedPoint,
+    ReturnMap,
+    SectionState,
+    spectrum,
+)
 from dcdrw_sim.model.rigs import Rigs, take
 from dcdrw_sim.model.wheel import kept, kinetic_energy
 from dcdrw_sim.motion.ends import FORWARD, End
-from dcdrw_sim.motion.ensemble import run_pairs
+from dcdrw_sim.motion.ensemble import run_pairs, spread
 
 Floats = NDArray[np.float64]
 
@@ -25,6 +35,10 @@ DIFFERENCE = 3e-6
 """Half width of the central differences, in rad and √(g/ℓ)."""
 NEUTRAL = 1e-6
 """A multiplier so close to 1 counts as 1."""
+SEARCHED = tuple(j / 24 for j in range(24))
+"""Phases from which a limit cycle is searched, in steps."""
+FOLLOWED, MOST_STRIKES = 400.0, 2000
+"""How long motions are followed to where the search may begin, in √(ℓ/g), and by how many strikes at most."""
 EQUAL = 1e-9
 """Steps whose lengths differ by no more than this part are of one length."""
 
@@ -130,6 +144,41 @@ def find_limit_cycles(rigs: Rigs, starts: Floats) -> LimitCycles:
         progress = _size((after - candidates) / scales[sought]) < np.maximum(PROGRESS * left, TOLERANCE)
         here[sought] = np.where(progress[:, None], candidates, there.states[alive])
     return found
+
+
+def search_fixed_point(return_map: ReturnMap, phases: Sequence[float] = SEARCHED) -> FixedPoint:
+    """The limit cycle of one pair, searched from several phases at once; a stable one where there is one.
+
+    Of several it is the one that was found from the phase nearest to one half.
+
+    Args:
+        return_map: the pair's.
+        phases: where to begin, as `ReturnMap.at_phase`.
+
+    Raises:
+        ValueError: from none of the phases a limit cycle was found, or no phase tells how to start.
+
+    """
+    rigs = spread(return_map.rig, len(phases), {})
+    states = np.array([return_map.at_phase(phase) for phase in phases])
+    found = find_limit_cycles(rigs, states)
+    if not found.stable.any():  # as far as the motions lead, and on from there
+        unit = math.sqrt(return_map.rig.front.length / return_map.rig.gravity)
+        section = np.column_stack([rigs.front.alpha, states])
+        motion = run_pairs(rigs, section, FOLLOWED * unit, MOST_STRIKES, strict=False)
+        for index, count in enumerate(motion.counts):
+            fronts = motion.strikes[index, :count][motion.strikes[index, :count]['wheel'] == 1]
+            states[index] = fronts['state'][-1, 1:]
+        later = find_limit_cycles(rigs, states)
+        found = LimitCycles(*(np.concatenate(pair) for pair in zip(found, later, strict=True)))
+    known = np.flatnonzero(found.found)
+    if not known.size:
+        raise ValueError(
+            f'no fixed point was found from {len(phases)} phases: the pair has no limit cycle, or starts too far off'
+        )
+    distance = abs(np.resize(np.asarray(phases, float), len(found.found)) - 0.5)
+    best = min(known.tolist(), key=lambda index: (not found.stable[index], distance[index]))
+    return return_map.fixed_point(SectionState(*found.states[best].tolist()))
 
 
 def losses(rigs: Rigs, cycles: LimitCycles) -> Losses:

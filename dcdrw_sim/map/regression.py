@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dcdrw_sim.map.limit_cycles import search_fixed_point
 from dcdrw_sim.map.return_map import Complexes, FixedPoint, Floats, NoReturnError, ReturnMap, spectrum
 
 RANK_TOLERANCE = 1e-10
@@ -56,8 +57,8 @@ class Trial(NamedTuple):
     """At the start, in steps."""
     states: Floats
     """At each section, rows [θ1′, θ2, θ2′], shape (steps + 1, 3); empty where the motion did not go on so long."""
-    steps: int | None
-    """Until θ2 stays within BAND of the fixed point; None if it never does."""
+    steps_to_cycle: int | None
+    """Until θ2 at the section stays within BAND of the fixed point; None if it never does."""
     trouble: str
     """Why the motion did not go on, else empty."""
 
@@ -67,10 +68,10 @@ class Convergence(NamedTuple):
 
     fixed_point: FixedPoint
     """With the multipliers of the exact derivative."""
-    raw: Regression
-    """The paper's, on the trials' four states."""
-    affine: Regression
-    """With an offset, on the three that are independent."""
+    raw: Regression | None
+    """The paper's, on the trials' four states; None where no trial went through all its steps."""
+    affine: Regression | None
+    """With an offset, on the three that are independent; None as `raw`."""
     trials: tuple[Trial, ...]
 
 
@@ -145,17 +146,17 @@ def measure(
         return_map: the map.
         phases: starts of the trials, as `ReturnMap.at_phase`.
         steps: of each trial.
-        fixed_point: where it is known already.
+        fixed_point: where it is known already; else it is searched from several phases.
 
     Raises:
-        ValueError: no fixed point, no trial that went on, or an impossible phase.
+        ValueError: no fixed point, or an impossible phase.
 
     """
-    fixed_point = fixed_point or return_map.fixed_point()
+    fixed_point = fixed_point or search_fixed_point(return_map)
     trials = tuple(_try(return_map, phase, steps, fixed_point.state.theta2) for phase in phases)
     whole = [trial.states for trial in trials if not trial.trouble]
     if not whole:
-        raise ValueError(f'none of {len(trials)} trials went on for {steps} steps: {trials[-1].trouble}')
+        return Convergence(fixed_point, None, None, trials)
     return Convergence(fixed_point, fit_raw(map(return_map.raw, whole)), fit_affine(whole), trials)
 
 

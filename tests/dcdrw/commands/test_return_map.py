@@ -9,6 +9,7 @@ import pytest
 from dcdrw.cli import main
 
 QUICK = ['--steps', '25']
+FAR_FROM_HALF = f'k: 0.001973\n    b: 6.273\n    slope: {math.radians(9.09)}'
 FORM = '/**:\n  ros__parameters:\n    {}\n'
 
 
@@ -22,7 +23,9 @@ def test_report_sets_all_measures_side_by_side(capsys):
     assert lines['raw'][0] == '1.0000'
     assert 0.85 < float(lines['affine'][0]) < 0.95
     assert lines['convergence'][:4] == ['20.0', 'steps', 'per', 'decade']
-    assert lines['steps taken'][:9] == ['25', '21', '17', '11', '0', '10', '16', '21', '24']
+    assert lines['to the cycle'][:9] == ['25', '21', '17', '11', '0', '10', '16', '21', '24']
+    assert lines['steps'][:9] == ['-'] * 9
+    assert lines['swing'][:4] == ['43.03', 'to', '57.01', '%']
 
 
 def test_json_holds_everything(tmp_path, capsys):
@@ -37,7 +40,24 @@ def test_json_holds_everything(tmp_path, capsys):
     assert len(result['regressions']['raw']['matrix']) == 4
     assert result['regressions']['affine']['rank'] == 3
     assert [trial['phase_percent'] for trial in result['trials']] == pytest.approx(list(range(10, 100, 10)))
+    assert result['fixed_point']['swing_percent'] == pytest.approx([47.19, 52.70], abs=0.005)
+    assert [trial['strike_steps'] for trial in result['trials']][2:6] == [15, 3, 0, 18]
     assert result['parameters']['k'] == 5.25
+
+
+def test_the_stable_limit_cycle_is_found_beside_an_unstable_one_and_told_though_trials_fail(tmp_path, capsys):
+    wheels = '\n    '.join(
+        f'{side}.{name}: {value}'
+        for side in ('front', 'rear')
+        for name, value in (('length', 1.0), ('mass', 1.0), ('spokes', 8.0))
+    )
+    (tmp_path / 'rig.yaml').write_text(FORM.format(f'{wheels}\n    gravity: 1.0\n    {FAR_FROM_HALF}'))
+    out = tmp_path / 'map.json'
+    assert main(['map', *QUICK, '--rig', str(tmp_path / 'rig.yaml'), '--json', str(out)]) == 0
+    found = json.loads(out.read_text(encoding='utf-8'))
+    assert found['fixed_point']['theta2_deg'] == pytest.approx(21.53, abs=0.01)
+    assert found['moduli'][0] == pytest.approx(0.98934, abs=2e-4)
+    assert found['fixed_point']['stable']
 
 
 def test_rig_file_changes_the_preset(tmp_path, capsys):

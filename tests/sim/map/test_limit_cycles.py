@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from scipy.integrate import quad
 
 from dcdrw_msgs_py.rig import RigParams, WheelParams
-from dcdrw_sim.map.limit_cycles import find_limit_cycles, losses
+from dcdrw_sim.map.limit_cycles import find_limit_cycles, losses, search_fixed_point
 from dcdrw_sim.map.return_map import ReturnMap
 from dcdrw_sim.model.dynamics import State, coupler, damper_power, stance_distance
 from dcdrw_sim.model.presets import preset
@@ -156,3 +156,45 @@ def test_a_state_whose_derivative_is_unknown_is_no_limit_cycle():
     rig = preset('paper-sweep')
     states = np.array([[0.5, rig.rear.alpha, 0.5]])
     assert not find_limit_cycles(spread(rig._replace(D0=1.0), 1, {}), states).found[0]
+
+
+# The search
+
+OCTAGON = WheelParams(1.0, 1.0, 8.0)
+TWO_CYCLES = RigParams(OCTAGON, OCTAGON, k=0.001973, b=6.273, slope=math.radians(9.09), gravity=1.0)
+"""A pair of a stable limit cycle near p = 0 and an unstable one near one half."""
+
+
+def test_a_stable_limit_cycle_is_found_far_from_half_a_step():
+    fixed = search_fixed_point(ReturnMap(TWO_CYCLES))
+    assert math.degrees(fixed.state.theta2) == pytest.approx(21.53, abs=0.01)
+    assert abs(fixed.multipliers[0]) == pytest.approx(0.98934, abs=2e-4)
+    assert fixed.stable
+
+
+def test_an_unstable_limit_cycle_is_told_where_there_is_no_other_near():
+    fixed = search_fixed_point(ReturnMap(TWO_CYCLES), (0.5, 2 / 3, 0.7))
+    assert math.degrees(fixed.state.theta2) == pytest.approx(-7.912, abs=0.001)
+    assert abs(fixed.multipliers[0]) == pytest.approx(1.00067, abs=1e-5)
+    assert not fixed.stable
+    assert fixed.steps_per_decade == math.inf
+
+
+def test_a_pair_without_a_limit_cycle_is_told():
+    with pytest.raises(ValueError, match='no fixed point was found from 24 phases'):
+        search_fixed_point(ReturnMap(SWEEP._replace(b=0.8)))
+
+
+# The swing
+
+
+def test_the_swing_is_that_of_the_motion_at_every_instant():
+    for rig in (RigParams().resolved(), MIXED.resolved(), SWEEP):
+        _, cycles = cycles_of(rig)
+        assert cycles.found[0]
+        motion = run(rig, State(rig.front.alpha, *cycles.states[0].tolist()), seconds=float(cycles.periods[0]))
+        seen = motion.at(np.linspace(0.0, motion.duration, 200_001))
+        phase = seen.rotation1 / (2 * rig.front.alpha) - seen.rotation2 / (2 * rig.rear.alpha)
+        errors = 100.0 * (phase % 1.0) - 50.0
+        assert cycles.swings[0] == pytest.approx([errors.min(), errors.max()], abs=1e-3)
+        assert (cycles.swings[0] - [errors.min(), errors.max()])[0] <= 1e-9
