@@ -38,6 +38,7 @@ from dcdrw_sim.motion.taylor import (
     OMEGA2,
     THETA1,
     THETA2,
+    Present,
     Row,
     Table,
     bare,
@@ -46,6 +47,7 @@ from dcdrw_sim.motion.taylor import (
     minimum,
     motion,
     rows,
+    rubs,
     step_size,
     work_parameters,
 )
@@ -196,8 +198,7 @@ def run_pairs(
     )
     if count:
         with np.errstate(all='ignore'):
-            friction = bool((rigs.coupler_friction > 0.0).any() or (rigs.rolling_resistance > 0.0).any())
-            _run(_aligned(SIZE), _parameters(rigs), starts, float(seconds), float(tolerance), friction, *ensemble)
+            _run(_aligned(SIZE), _parameters(rigs), starts, float(seconds), float(tolerance), rubs(rigs), *ensemble)
     if strict and (lost := np.flatnonzero(ensemble.ends == TOO_FAST)).size:
         raise MotionError(
             f'the motion of pair {lost[0]} at t = {ensemble.durations[lost[0]]:.9g} s is too fast to follow'
@@ -431,7 +432,7 @@ def _run(
     starts: Floats,
     seconds: float,
     tolerance: float,
-    friction: bool,
+    friction: Present,
     records: NDArray[np.void],
     counts: NDArray[np.int64],
     ends: NDArray[np.int64],
@@ -457,10 +458,10 @@ def _run(
                 following += 1
         if active == 0:
             return
-        expand(w, LANES, friction)
+        expand(w, LANES, friction, None)
         for l in range(LANES):
             w[REACH + l] = min(step_size(w, l, tolerance), LONGEST_STEP * w[UNIT + l])
-            if friction:
+            if friction is not None:
                 w[REACH + l] = friction_step(w, l, w[REACH + l])
             w[STEP + l] = max(0.0, min(w[REACH + l], seconds - w[TIME + l]))
         _cut_steps(w)

@@ -288,8 +288,8 @@ class Simulation:
             if self.standing[i]:
                 self._rest(i)
         w = self._work
-        friction = self._rig.coupler_friction > 0.0 or self._rig.rolling_resistance > 0.0
-        taylor.expand(w, 1, friction)
+        friction = taylor.rubs(self._rig)
+        taylor.expand(w, 1, friction, True if self._torques != NO_TORQUES else None)
         h = min(taylor.step_size(w, 0, TOLERANCE), LONGEST_STEP * self._unit)
         h = self._turn_once(taylor.friction_step(w, 0, h) if friction else h)
         self._require_progress(h >= SHORTEST_STEP * self._unit)

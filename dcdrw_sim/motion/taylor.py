@@ -23,7 +23,7 @@ sin' = ω cos and cos' = −ω sin; D and F/D from D·D and D·(F/D), solved for
 import math
 from collections.abc import MutableSequence
 from operator import mul
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -41,6 +41,9 @@ LANES = 16
 """Pairs side by side: two AVX-512 or four AVX2 registers."""
 ORDER = 16
 """Degree of the polynomials; a power of two, so that the step size takes square roots only."""
+
+Present = Literal[True] | None
+"""Whether a part of the model is present; told by the type, so that kernels are compiled without what is not."""
 
 NUMB, SWING = 16.0, 4.0
 """Friction's u = v/v0 beyond which tanh u is ±1 to rounding, and by how much u may change in a step within."""
@@ -139,14 +142,19 @@ def work_parameters(
         ALPHA2: rear.alpha,
         KEPT1: kept(front),
         KEPT2: kept(rear),
-        DRIVE1: torques[0] / inertia(front),
-        DRIVE2: torques[1] / inertia(rear),
+        DRIVE1: torques[0] / (front.mass * rig.gravity * front.length),
+        DRIVE2: torques[1] / (rear.mass * rig.gravity * rear.length),
         RUB: rig.coupler_friction,
         INV_V0: 1.0 / rig.friction_speed,
         ROLLING: rig.rolling_resistance,
         FREE1: 1.0,
         FREE2: 1.0,
     }
+
+
+def rubs(rig: RigParams | Rigs) -> Present:
+    """Whether a rig has friction, or any of N."""
+    return True if np.any(rig.coupler_friction) or np.any(rig.rolling_resistance) else None
 
 
 def rows(w: Table, lanes: int) -> Table:
@@ -207,13 +215,14 @@ def cos_series(x: Row) -> Row:
     return total
 
 
-def expand(work: Table, lanes: int, friction: bool) -> None:
+def expand(work: Table, lanes: int, friction: Present, driven: Present) -> None:
     """Expand the motion about the state: fill the series from coefficient 0 of the angles and speeds.
 
     Args:
         work: work array, at least END long, with state and parameters set; angles within ±π/4.
         lanes: 1 for a list, LANES for an array.
-        friction: whether the coupler or a wheel has any; without, its series are left alone.
+        friction: present where the coupler or a wheel has any; without, its series are left alone.
+        driven: present where torques act on the hubs.
 
     """
     w = rows(work, lanes)
@@ -236,7 +245,7 @@ def expand(work: Table, lanes: int, friction: bool) -> None:
         length = (stance * (l1 * sin1 - l2 * sin2) - l1 * l2 * cos - 0.5 * w[SUM1]) * inverse
         rate = (order + 1) * length
         force = w[K] * w[LENGTH + n] + w[B] * rate
-        if friction:
+        if friction is not None:
             _grip(work, w, lanes, order, rate)
             force = force + w[RUB] * w[GRIP + n]
         if order == 0:
@@ -247,15 +256,15 @@ def expand(work: Table, lanes: int, friction: bool) -> None:
         convolve(w, _TORQUES, order)
         weight1 = w[SIN1 + n] * w[COS_SLOPE] + w[COS1 + n] * w[SIN_SLOPE]
         weight2 = w[SIN2 + n] * w[COS_SLOPE] + w[COS2 + n] * w[SIN_SLOPE]
-        if friction:
+        if friction is not None:
             weight1, weight2 = weight1 - w[ROLLING] * w[GRIP1 + n], weight2 - w[ROLLING] * w[GRIP2 + n]
-        omega1, omega2 = w[G1] * weight1 - w[SUM1] * w[INV_ML1], w[G2] * weight2 + w[SUM2] * w[INV_ML2]
-        if order == 0:
-            omega1, omega2 = omega1 + w[DRIVE1], omega2 + w[DRIVE2]
-        omega1, omega2 = omega1 * (w[FREE1] * scale), omega2 * (w[FREE2] * scale)
+        if driven is not None and order == 0:
+            weight1, weight2 = weight1 + w[DRIVE1], weight2 + w[DRIVE2]
+        omega1 = (w[G1] * weight1 - w[SUM1] * w[INV_ML1]) * (w[FREE1] * scale)
+        omega2 = (w[G2] * weight2 + w[SUM2] * w[INV_ML2]) * (w[FREE2] * scale)
         w[THETA1 + following], w[THETA2 + following] = w[OMEGA1 + n] * scale, w[OMEGA2 + n] * scale
         w[OMEGA1 + following], w[OMEGA2 + following], w[OMEGA + following] = omega1, omega2, omega1 - omega2
-        if friction:
+        if friction is not None:
             w[SURGE1 + n] = w[L1] * w[INV_V0] * ((order + 1) * omega1)
             w[SURGE2 + n] = w[L2] * w[INV_V0] * ((order + 1) * omega2)
 

@@ -22,7 +22,7 @@ def expanded(rig, state, external_force=0.0, torques=NO_TORQUES):
     for row, value in work_parameters(rig, external_force, torques).items():
         w[row] = value
     w[S], (w[THETA1], w[OMEGA1], w[THETA2], w[OMEGA2]) = rig.S0, state
-    taylor.expand(w, 1, True)
+    taylor.expand(w, 1, True, True)
     return w
 
 
@@ -113,7 +113,7 @@ def test_all_lanes_of_an_array_give_what_a_list_gives_for_one():
             w[row + l] = value
         w[S + l] = UNEQUAL.resolved().S0
         w[[THETA1 + l, OMEGA1 + l, THETA2 + l, OMEGA2 + l]] = state
-    taylor.expand(w, LANES, True)
+    taylor.expand(w, LANES, True, True)
     for l, state in enumerate(states):
         alone = expanded(UNEQUAL, state)
         for series in (THETA1, OMEGA1, THETA2, OMEGA2):
