@@ -127,6 +127,26 @@ def test_coupler_and_slope_change_while_it_runs_and_nonsense_is_refused(bench):
     assert last[1].stamp_ns - last[0].stamp_ns == STEP_NS // 2
 
 
+def test_gyration_restitution_and_friction_change_while_it_runs(bench):
+    _, heard = start_held(bench)
+    bench.wait(lambda: len(moving(heard)) > 20, 'motion')
+    for name, value in (
+        ('front.gyration', 0.5),
+        ('rear.restitution', 0.1),
+        ('coupler_friction', 400.0),
+        ('rolling_resistance', 0.004),
+        ('friction_speed', 0.1),
+        ('k', 0.0),
+        ('b', 0.0),
+    ):
+        assert set_parameter(bench, name, value).successful
+    count = len(heard)
+    bench.wait(lambda: len(heard) > count + 20, 'samples with friction alone')
+    coupler = samples(heard)[-1].coupler
+    assert coupler.force == pytest.approx(400.0 * math.tanh(coupler.rate / 0.1), rel=1e-6)
+    assert not set_parameter(bench, 'rear.restitution', 1.0).successful
+
+
 def test_command_adds_to_the_coupler_force_until_it_is_stale(bench):
     _, heard = start_held(bench, k=0, b=0, command_timeout=0.3)
     publisher = bench.publisher(COUPLER_FORCE_COMMAND)

@@ -15,7 +15,7 @@ from dcdrw_sim.model.wheel import gentlest_slope
 from dcdrw_sim.motion.ends import BACKWARD
 from dcdrw_sim.motion.ensemble import spread
 from dcdrw_sim.motion.trajectory import run
-from dcdrw_sim.relatives.even_gait import even_stall_band, gentlest_even_gait
+from dcdrw_sim.relatives.even_gait import even_pair, even_stall_band, gentlest_even_gait
 from dcdrw_sim.relatives.rigid_pair import gentlest_slope as rigid_gentlest_slope
 from dcdrw_sim.relatives.rimless_wheel import speed_to_pass
 from dcdrw_sim.study.regimes import (
@@ -51,6 +51,21 @@ def test_stall_band_of_the_papers_sweep(band):
     low, high = band
     assert low.values == pytest.approx([0.449388, 0.44883, 0.442565], abs=1e-4)
     assert high.values == pytest.approx([1.751631, 1.7522, 1.75842], abs=1e-4)
+
+
+@pytest.mark.parametrize(('gyration', 'restitution'), [(0.6, 0.0), (0.3, 0.2)])
+def test_gentlest_slope_of_real_wheels_is_near_its_closed_form(gyration, restitution):
+    wheel = RIG.front._replace(gyration=gyration, restitution=restitution)
+    rig = RIG._replace(front=wheel, rear=wheel)
+    pair = even_pair(rig)
+    found = gentlest_slopes(spread(rig, 1, {}))
+    assert found.values[0] == pytest.approx(gentlest_even_gait(pair.alpha, pair.k, pair.b, pair.kept).slope, rel=0.05)
+    for factor, walks in ((1.02, True), (0.98, False)):
+        steeper = rig._replace(slope=factor * float(found.values[0]))
+        start = [wheel.alpha, *found.states[0]]
+        assert (
+            judge_starts(spread(steeper, 1, {}), np.array([start]), 2000.0).verdict[0] <= Verdict.ELSEWHERE
+        ) == walks
 
 
 def test_at_a_fold_a_multiplier_is_one(band):
