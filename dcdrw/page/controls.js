@@ -13,7 +13,9 @@ const sliders = new Map();
 
 export function setUpControls(sender) {
   send = sender;
-  element('controls').addEventListener('submit', (event) => event.preventDefault());
+  for (const id of ['controls', 'more-controls']) {
+    element(id).addEventListener('submit', (event) => event.preventDefault());
+  }
   element('reset').addEventListener('click', () => send({ do: 'reset' }));
   element('pause').addEventListener('click', () => send({ do: 'pause', value: !board.paused }));
   element('record').addEventListener('click', () => send({ do: 'record', value: !board.recording }));
@@ -53,7 +55,7 @@ function press(id, pressed, active, idle) {
 }
 
 class Slider {
-  constructor({ name, doc, unit, low, high, top, scale }) {
+  constructor({ name, doc, unit, low, high, top, scale, more }) {
     Object.assign(this, { name, scale, touched: -Infinity, timer: null });
     const label = document.createElement('label');
     label.innerHTML = '<span><b></b> <span></span></span><span class="entry"><input type="number" step="any">'
@@ -77,7 +79,7 @@ class Slider {
         this.ask(this.field.valueAsNumber, this.range);
       }
     });
-    element('controls').append(label);
+    element(more ? 'more-controls' : 'controls').append(label);
   }
 
   // Sends the last value asked for, at most every SEND_MS.

@@ -59,6 +59,8 @@ WIDEST_SLIDER = 10.0
 """Where the slider of a parameter whose default is 0 ends at most."""
 CONTROLS = {field.name: field for field in fields(RigParams) if field.quantity.live and not field.quantity.derived}
 """What the page's sliders set."""
+FIRST_CONTROLS = ('k', 'b', 'slope')
+"""Those that are always in sight."""
 
 
 class Command(NamedTuple):
@@ -362,6 +364,7 @@ def _control(field: Field, rig: RigParams) -> dict[str, Any]:
         'high': _rounded(quantity.high, 6),
         'top': 4.0 * field.default or min(quantity.high, WIDEST_SLIDER),
         'value': lookup(rig, field.name),
+        'more': field.name not in FIRST_CONTROLS,
     }
 
 

@@ -265,6 +265,8 @@ def test_sliders_have_the_bounds_and_units_of_the_parameters():
     slope = controls['slope']
     assert (slope['low'] * slope['scale'], slope['high'] * slope['scale']) == pytest.approx((-45.0, 45.0))
     assert slope['unit'] == '°'
+    assert controls['front.gyration']['top'] == 2.0
+    assert [name for name, control in controls.items() if not control['more']] == ['k', 'b', 'slope']
 
 
 def test_command_is_read_or_refused_with_the_reason():
