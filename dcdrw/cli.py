@@ -1,6 +1,7 @@
 """The command `dcdrw`: which commands there are. The module of one is imported when it is chosen."""
 
 import sys
+from textwrap import fill
 
 from dcdrw.commands import Command
 from dcdrw.entry import EXECUTABLES
@@ -58,7 +59,7 @@ completion in bash and zsh, with argcomplete installed:
   eval "$(register-python-argcomplete dcdrw)"
 
 nodes, each run by `ros2 run dcdrw NAME`:
-  """ + ', '.join(name for name in EXECUTABLES if name != 'dcdrw')
+""" + fill(', '.join(name for name in EXECUTABLES if name != 'dcdrw'), 100, initial_indent='  ', subsequent_indent='  ')
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -13,11 +13,19 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from std_srvs.srv import SetBool, Trigger
 
 from dcdrw_msgs_py.diagnosis import STATE, STEP_DIFFERENCE, Diagnosis, Level, SourceState
-from dcdrw_msgs_py.messages import JointSampleWriter, to_stamp
+from dcdrw_msgs_py.messages import JointSampleWriter, run_message, to_stamp
 from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
 from dcdrw_msgs_py.samples import SECOND
-from dcdrw_msgs_py.topics import CLOCK, COUPLER_FORCE_COMMAND, JOINT_STATES, PERSON_FORCE, REAR_TORQUE_COMMAND, Topic
+from dcdrw_msgs_py.topics import (
+    CLOCK,
+    COUPLER_FORCE_COMMAND,
+    JOINT_STATES,
+    PERSON_FORCE,
+    REAR_TORQUE_COMMAND,
+    RUNS,
+    Topic,
+)
 from dcdrw_sim.motion.ends import MotionError, accept
 from dcdrw_sim.rig.simulator import SimulatedRig, SimulatorParams, Timeline
 
@@ -56,6 +64,10 @@ class SimulatorNode(Node):
         self._refused_commands = 0
         self._commands = {COUPLER_FORCE_COMMAND: Age(), REAR_TORQUE_COMMAND: Age()}
         self._writer = JointSampleWriter()
+        self._runs = advertise(self, RUNS)
+        # Not 1: a simulator that was started anew must not seem to go on with the run of the one before.
+        self._run = time.time_ns() // SECOND
+        self._announced = False
         self._joint_states = advertise(self, JOINT_STATES)
         self._clock_publisher = advertise(self, CLOCK) if params.publish_clock else None
         self._person_force = advertise(self, PERSON_FORCE) if params.person.walks else None
@@ -134,6 +146,9 @@ class SimulatorNode(Node):
         if self._clock_publisher and due >= self._next_clock:
             self._clock_publisher.publish(ClockMessage(clock=to_stamp(stamp_ns)))
             self._next_clock = due + 1.0 / CLOCK_RATE - 1e-9
+        if not self._announced:
+            self._announced = True
+            self._runs.publish(run_message(stamp_ns, self._run))
         if sample:
             self._joint_states.publish(self._writer.write(sample))
             if self._person_force:
