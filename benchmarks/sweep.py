@@ -55,22 +55,13 @@ def bare_kernel() -> Callable[[int], None]:
     del motions
     jobs = []
     for part in np.array_split(np.arange(COUNT), CORES):
-        counts = (np.zeros(len(part), np.int64), np.zeros(len(part), np.int64), np.zeros(len(part)))
-        jobs.append(
-            (
-                ensemble._aligned(ensemble.SIZE),
-                ensemble._parameters(take(pairs, part)),
-                starts[part],
-                SWEEP.seconds,
-                ensemble.TOLERANCE,
-                np.zeros((len(part), capacity), ensemble.STRIKE),
-                *counts,
-            )
-        )
+        work, parameters = ensemble._aligned(ensemble.SIZE), ensemble._parameters(take(pairs, part))
+        motion = ensemble._blank(len(part), capacity)
+        jobs.append((work, parameters, starts[part], SWEEP.seconds, ensemble.TOLERANCE, False, *motion))
 
     def program(cores: int) -> None:
         for job in jobs:
-            job[6][:] = 0
+            job[7][:] = 0  # the counts
         on_threads(cores, lambda job: ensemble._run(*job), jobs)
 
     return program

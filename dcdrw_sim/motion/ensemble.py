@@ -189,13 +189,7 @@ def run_pairs(
     limits = np.column_stack([rigs.front.alpha, free, rigs.rear.alpha, free]) * (1 + 1e-12)
     if not (np.isfinite(starts) & (np.abs(starts) <= limits)).all():
         raise ValueError('states must be finite, their angles within ±α of their wheels')
-    ensemble = Ensemble(
-        np.zeros((count, capacity), STRIKE),
-        np.zeros(count, np.int64),
-        np.zeros(count, np.int64),
-        np.zeros(count),
-        np.zeros((count, 2)),
-    )
+    ensemble = _blank(count, capacity)
     if count:
         with np.errstate(all='ignore'):
             _run(_aligned(SIZE), _parameters(rigs), starts, float(seconds), float(tolerance), rubs(rigs), *ensemble)
@@ -266,6 +260,12 @@ def _parameters(rigs: Rigs) -> Floats:
 
 def _column(row: int) -> int:
     return (row - taylor.FIRST_PARAMETER) // LANES
+
+
+def _blank(count: int, capacity: int) -> Ensemble:
+    """Room for what becomes of so many pairs."""
+    counts, ends = np.zeros((2, count), np.int64)
+    return Ensemble(np.zeros((count, capacity), STRIKE), counts, ends, np.zeros(count), np.zeros((count, 2)))
 
 
 def _aligned(size: int) -> Floats:
