@@ -55,7 +55,7 @@ def draw_card(
 def _write(axes: Any, lines: dict[str, str]) -> None:
     axes.set_axis_off()
     for row, (text, colour) in enumerate(zip(lines.values(), COLOURS, strict=False)):
-        axes.text(
+        written = axes.text(
             0.0,
             1.0 - row / len(lines),
             text,
@@ -65,6 +65,7 @@ def _write(axes: Any, lines: dict[str, str]) -> None:
             linespacing=1.25,
             bbox={'facecolor': 'none', 'edgecolor': colour, 'linewidth': 1.2, 'pad': 4.0},
         )
+        written.set_in_layout(False)  # long lines do not make the drawings below narrower
 
 
 def _draw_map(axes: Any, grid: Scores, chosen: dict[str, Assessment], on_sale: Mapping[str, Sequence[float]]) -> None:
