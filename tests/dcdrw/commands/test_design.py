@@ -38,6 +38,25 @@ def test_best_pair_of_parts_with_card_and_numbers(tmp_path, parts, capsys):
     assert (tmp_path / 'out' / 'card.png').read_bytes().startswith(b'\x89PNG')
 
 
+def test_what_swings_beyond_the_band_is_not_recommended_and_what_is_the_monitor_has_seen(tmp_path, capsys):
+    path = tmp_path / 'parts.csv'
+    path.write_text('kind,value\nspring,16\ndashpot,10\n')
+    given = ['--k', '41.1', '--b', '14.7']
+    assert main(['design', '--available', str(path), *given, '--out', str(tmp_path / 'out')]) == 0
+    output = capsys.readouterr().out
+    assert 'fastest          k = 16 N/m, b = 10 N·s/m' in output
+    assert 'swings from 44.13 to 55.83 %' in output
+    assert 'NOT RECOMMENDED' in output.partition('given')[2]
+    assert 'swings from 43.37 to 56.58 %' in output.partition('given')[2]
+    couplers = json.loads((tmp_path / 'out' / 'design.json').read_text())['couplers']
+    fastest, other = couplers['fastest'], couplers['given']
+    assert fastest['recommended']
+    assert fastest['monitor_steps'] == fastest['steps']
+    assert (max(fastest['steps']), max(fastest['strike_steps'])) == (6, 3)
+    assert not other['recommended']
+    assert (other['worst_steps'], max(other['strike_steps'])) == (None, 2)
+
+
 @pytest.mark.parametrize(
     ('content', 'message'),
     [

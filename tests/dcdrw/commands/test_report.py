@@ -1,6 +1,7 @@
 """`dcdrw report`: recordings in, one page and its tables out."""
 
 import csv
+import json
 import re
 from html.parser import HTMLParser
 from io import StringIO
@@ -79,6 +80,13 @@ def test_page_is_self_contained_and_tells_each_trial(report):
     assert 'first: "with" new springs' in words  # the operator's note
     assert text.count('<svg') == 6  # the overlays by steps and by time, and two for each trial
     assert {'out', 'bag'} <= set(page.words)
+
+
+def test_contraction_is_one_number_in_every_place(report, live_trial):
+    live = next(trial for trial in rows(report, 'trials.csv') if trial['source'] == 'simulated')
+    summary = json.loads((live_trial / 'summary.json').read_text())
+    assert float(live['contraction_per_step']) == pytest.approx(summary['contraction_per_step'], rel=1e-5)
+    assert f'{100 * summary["contraction_per_step"]:.1f}' in report.read_text()
 
 
 def test_tables_hold_every_number(report):
