@@ -102,7 +102,7 @@ def test_a_full_disk_leaves_no_file_that_looks_whole(arguments, tmp_path):
     assert 'Traceback' not in done.stderr
     assert message.startswith(f'dcdrw {arguments[0]}: ')
     assert re.search(r'out\.(mp4|avi|mkv|pdf|urdf)|models\.json|wheel\.png', message)
-    assert not [path for path in tmp_path.iterdir() if path.stat().st_size > 4000 and path.is_file()]
+    assert not [path for path in tmp_path.iterdir() if path.stat().st_size >= 4096 and path.is_file()]
     assert not list(tmp_path.glob('out*'))
 
 

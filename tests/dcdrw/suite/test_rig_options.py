@@ -45,7 +45,7 @@ def test_an_option_counts_more_than_the_file(tmp_path):
     ('arguments', 'message'),
     [
         (('--mass', '-3'), r'front\.mass must be > 0 kg, got -3\.0 \(--mass\)'),
-        (('--spokes', '3'), r'front\.spokes must be ≥ 4, got 3 \(--spokes\)'),
+        (('--spokes', '3'), r'front\.spokes must be ≥ 4, ≤ 1000, got 3 \(--spokes\)'),
         (('--slope-deg', '60'), r'slope must be .* \(--slope-deg\)'),
     ],
 )

@@ -1,6 +1,7 @@
 import itertools
 import math
 import random
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -94,9 +95,9 @@ def test_samples_do_not_depend_on_when_one_looks(seed):
     random_times = sorted(random.Random(seed).uniform(0.0, 3.0) for _ in range(40))
     params = SimulatorParams(person=PersonParams(walks=True), seed=seed)
     often, seldom = SimulatedRig(PAPER, params), SimulatedRig(PAPER, params)
-    for t in random_times:
+    for t, following in pairwise((*random_times, 4.0)):
         often.read(t, 0)
-        often.prepare(t + 0.05)
+        often.prepare(following)
     assert often.read(4.0, 0).front == pytest.approx(seldom.read(4.0, 0).front, abs=1e-9)
 
 
