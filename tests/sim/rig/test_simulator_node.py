@@ -231,7 +231,7 @@ def test_as_fast_as_possible_outruns_the_clock(bench):
 @pytest.mark.parametrize(
     ('parameters', 'message'),
     [
-        ({'front__spokes': 3}, 'front.spokes must be ≥ 4, got 3'),
+        ({'front__spokes': 3}, 'front.spokes must be ≥ 4, ≤ 1000, got 3'),
         ({'k': '.nan'}, 'k must be ≥ 0, ≤ 1e+06 N/m, got nan'),
         ({'slope': 0.001}, 'too gentle'),
         ({'rate': 'fast'}, 'rate must be a number'),
