@@ -112,7 +112,7 @@ class Truth:
         """The frames that are not lost, each with its joints."""
         case, scene, lost = self._case, SceneParams(slope=RIG.slope), random.Random(0)
         camera = case.view.make_camera()
-        distance = scene.tag_plane + float(camera.matrix[0, 0]) * TAGS.size / case.side
+        distance = scene.tag_plane(scene.mounts(TAGS)[0]) + float(camera.matrix[0, 0]) * TAGS.size / case.side
         renderer = Renderer(scene, case.view._replace(distance=distance), case.look, TAGS, camera, False)
         footing: Footing | None = None
         for frame in range(round(self._seconds * RATE)):

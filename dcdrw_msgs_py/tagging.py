@@ -27,6 +27,11 @@ class Family(NamedTuple):
     """How many tags it has."""
 
 
+CLEAR = 0.06
+"""The tags sit on the axles' ends, all in one plane so far before the nearer wheel that no spoke ever hides one [ℓ]."""
+SPACING = 0.2
+"""From the plane of the rear wheel to that of the front wheel, which is nearer to the camera [ℓ]."""
+
 FAMILIES = {'36h11': Family(6, 587), '16h5': Family(4, 30), '25h9': Family(5, 35), '36h10': Family(6, 2320)}
 
 
@@ -42,6 +47,15 @@ class TagGroup(NamedTuple):
     y: Annotated[
         tuple[float, ...], Quantity("each tag's centre from the hub, along the slope normal at ψ = 0", 'm')
     ] = (0.0,)
+    standoff: Annotated[
+        float,
+        Quantity(
+            "how far the tags are before the plane of the wheel's feet, towards the camera: the debug picture needs it",
+            'm',
+            low=0.0,
+            derived=f'{CLEAR:g} ℓ; on the rear wheel {CLEAR + SPACING:g} ℓ, so that all tags are in one plane',
+        ),
+    ] = math.nan
 
 
 class TagParams(NamedTuple):
@@ -51,6 +65,21 @@ class TagParams(NamedTuple):
     size: Annotated[float, Quantity('side of the black square', 'm', above=0.0)] = 0.16
     front: TagGroup = TagGroup()
     rear: TagGroup = TagGroup(ids=(1,))
+
+    def resolved(self, length: float, spacing: float = math.nan) -> 'TagParams':
+        """The same tags with the derived defaults filled in.
+
+        Args:
+            length: of the legs, ℓ [m].
+            spacing: between the planes of the wheels [m]; SPACING where it is NaN.
+
+        """
+        behind = SPACING * length if math.isnan(spacing) else spacing
+        front, rear = (
+            group._replace(standoff=CLEAR * length + further if math.isnan(group.standoff) else group.standoff)
+            for group, further in ((self.front, 0.0), (self.rear, behind))
+        )
+        return self._replace(front=front, rear=rear)
 
 
 class Mount(NamedTuple):
@@ -66,6 +95,8 @@ class Mount(NamedTuple):
     y: float
     size: float
     """Side of the black square [m]."""
+    standoff: float = math.nan
+    """How far it is before the plane of the wheel's feet [m]; NaN where it is not resolved."""
 
 
 def mounts(params: TagParams) -> tuple[Mount, ...]:
@@ -80,12 +111,13 @@ def mounts(params: TagParams) -> tuple[Mount, ...]:
         raise ValueError(f'family must be one of {", ".join(FAMILIES)}, got {params.family!r}')
     found: dict[int, Mount] = {}
     for wheel, group in ((FRONT, params.front), (REAR, params.rear)):
-        for name, values in group._asdict().items():
+        *lists, standoff = group
+        for name, values in zip(group._fields, lists, strict=False):
             if len(values) != len(group.ids):
                 raise ValueError(
                     f'{wheel}.{name} must have one entry for each of {wheel}.ids {list(group.ids)}, got {list(values)}'
                 )
-        for tag, angle_deg, x, y in zip(*group, strict=True):
+        for tag, angle_deg, x, y in zip(*lists, strict=True):
             if tag in found:
                 raise ValueError(
                     f'{wheel}.ids: tag {tag} is mounted twice, on the {found[tag].wheel} wheel and on the '
@@ -96,7 +128,7 @@ def mounts(params: TagParams) -> tuple[Mount, ...]:
                     f'{wheel}.ids: family {params.family} has no tag {tag}, only 0 to '
                     f'{FAMILIES[params.family].size - 1}'
                 )
-            found[tag] = Mount(wheel, tag, math.radians(angle_deg), x, y, params.size)
+            found[tag] = Mount(wheel, tag, math.radians(angle_deg), x, y, params.size, standoff)
     return tuple(found.values())
 
 

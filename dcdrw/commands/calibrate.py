@@ -91,9 +91,9 @@ def _changes(film: Film, found: Calibration, axes: PlaneAxes, learn_slope: bool)
     yield 'camera_follows', False
     for name, wheel, group in ((FRONT, found.front, tags.front), (REAR, found.rear, tags.rear)):
         yield f'{name}.length', round(wheel.length.value, 5)
-        for key, values in moved(group, wheel)._asdict().items():
-            if key != 'ids':
-                yield f'{name}.{key}', [round(value, 5) for value in values]
+        there = moved(group, wheel)
+        for key, values in (('angles_deg', there.angles_deg), ('x', there.x), ('y', there.y)):
+            yield f'{name}.{key}', [round(value, 5) for value in values]
 
 
 def moved(group: TagGroup, wheel: WheelCalibration) -> TagGroup:

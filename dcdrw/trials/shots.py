@@ -238,7 +238,7 @@ def _write_rig(path: Path, params: FilmParams) -> None:
     """Write rig, tags and how the camera stands for every node; derived defaults are left to the nodes."""
     values = {
         **given(params.rig),
-        **given(params.tags),
+        **given(params.tags.resolved(params.scene.hub_height, params.scene.spacing)),
         'camera_follows': params.view.follow,
         'roll_deg': params.view.roll_deg,
     }

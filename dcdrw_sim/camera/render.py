@@ -14,7 +14,7 @@ from dcdrw_msgs_py.opencv import opencv, tag_cells
 from dcdrw_msgs_py.quantity import Quantity
 from dcdrw_msgs_py.rig import FRONT, REAR, WheelShape
 from dcdrw_msgs_py.samples import JointSample
-from dcdrw_msgs_py.tagging import Mount, TagParams, corners, mounts
+from dcdrw_msgs_py.tagging import Mount, TagParams, corners
 from dcdrw_sim.camera.scene import (
     CameraPose,
     Floats,
@@ -144,7 +144,11 @@ class Renderer:
         if not view.follow:
             self._pose = self._pose.moved(view.place)
         self._scale = float(camera.matrix[0, 0]) / view.distance
-        self._tags = [_Tag(mount, tags.family) for mount in mounts(tags)]
+        self._tags = [_Tag(mount, tags.family, scene.tag_plane(mount)) for mount in scene.mounts(tags)]
+        self._ends = [
+            max([tag.plane for tag in self._tags if tag.wheel == wheel], default=plane)
+            for wheel, plane in enumerate(scene.wheel_planes)
+        ]
         self._rays = _pixel_rays(*camera[:2], camera.matrix.tobytes(), camera.distortion.tobytes())
         self._sight = 1.05 * float(np.hypot(*np.nan_to_num(self._rays, nan=0.0).reshape(-1, 2).T).max())
         self._tag_rays = np.nan_to_num(self._rays, nan=1e6)  # no tag there
@@ -204,9 +208,7 @@ class Renderer:
         places = footing.places(*turned(joints, 0.0))
         pose = self.pose(places)
         return {
-            tag.mount.id: self._camera.project(
-                pose.optical(places[tag.wheel].points(corners(tag.mount), self._scene.tag_plane))
-            )
+            tag.mount.id: self._camera.project(pose.optical(places[tag.wheel].points(corners(tag.mount), tag.plane)))
             for tag in self._tags
         }
 
@@ -221,16 +223,18 @@ class Renderer:
 
     def _draw_rig(self, frame: Picture, places: tuple[WheelPlace, WheelPlace]) -> None:
         """Draw from far to near: the rear wheel, the coupler, the front wheel, the axles' ends, the tags."""
-        pose, half, plane = self.pose(places), self._scene.wheel_plane, self._scene.tag_plane
+        pose, (front_plane, rear_plane) = self.pose(places), self._scene.wheel_planes
         front, rear = places
         axles = [
-            (place.along, left, place.above) for place, near in ((rear, -half), (front, half)) for left in (near, plane)
+            (place.along, left, place.above)
+            for place, near, end in ((rear, rear_plane, self._ends[1]), (front, front_plane, self._ends[0]))
+            for left in (near, end)
         ]
         points = np.concatenate(
             (
-                rear.points(self._wheels[1], -half),
+                rear.points(self._wheels[1], rear_plane),
                 self._coupler_points(rear, front),
-                front.points(self._wheels[0], half),
+                front.points(self._wheels[0], front_plane),
                 axles,
             )
         )
@@ -276,8 +280,7 @@ class Renderer:
         )
 
     def _draw_tags(self, frame: Picture, pose: CameraPose, places: tuple[WheelPlace, WheelPlace]) -> None:
-        plane = self._scene.tag_plane
-        optical = pose.optical([places[tag.wheel].points(tag.points, plane) for tag in self._tags])
+        optical = pose.optical([places[tag.wheel].points(tag.points, tag.plane) for tag in self._tags])
         outlines, axes = optical[:, :4], optical[:, 4:]
         depth = outlines[..., 2]
         visible = ((depth > 0.05 * self._unit) & (np.hypot(*outlines.T[:2]).T < self._sight * depth)).all(axis=1)
@@ -309,7 +312,7 @@ class Renderer:
         cv2, pose = self._cv2, self.pose(places)
         for wheel in hidden:
             seen = [
-                self._pixels(pose.optical(places[wheel].points(tag.points[:4], self._scene.tag_plane)))
+                self._pixels(pose.optical(places[wheel].points(tag.points[:4], tag.plane)))
                 for tag in self._tags
                 if tag.wheel == wheel
             ]
@@ -416,8 +419,10 @@ class Renderer:
 class _Tag:
     """One tag as a texture: its grey values times what they cover, and how much they cover."""
 
-    def __init__(self, mount: Mount, family: str) -> None:
+    def __init__(self, mount: Mount, family: str, plane: float) -> None:
         self.mount, self.wheel = mount, 0 if mount.wheel == FRONT else 1
+        self.plane = plane
+        """To the left of the middle between the wheels [m]."""
         black = tag_cells(family, mount.id)
         self.cells = len(black)
         board = np.where(np.pad(black, WHITE_BORDER, constant_values=True), _PAPER, _INK)

@@ -14,14 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from dcdrw_msgs_py.camera import Camera, pinhole, read_camera
 from dcdrw_msgs_py.quantity import Quantity
-from dcdrw_msgs_py.rig import RigParams, Slope, StanceDistance, WheelShape
+from dcdrw_msgs_py.rig import FRONT, RigParams, Slope, StanceDistance, WheelShape
 from dcdrw_msgs_py.rolling import regular_stance_distance, stance, stance_distance_by_hubs
 from dcdrw_msgs_py.samples import JointSample, Turn
+from dcdrw_msgs_py.tagging import SPACING, Mount, TagParams, mounts
 
 Floats = NDArray[np.float64]
 
-TAG_STANDOFF = 0.06
-"""The tags sit on the axles' ends, all in one plane so far before the nearer wheel that no spoke ever hides one [ℓ]."""
 LONGEST = 100.0
 """A coupler longer than this is no measurement [ℓ]."""
 FASTEST = 1e3
@@ -43,7 +42,7 @@ class SceneParams(NamedTuple):
             'm',
             low=0.0,
             live=True,
-            derived='0.2 ℓ',
+            derived=f'{SPACING:g} ℓ',
         ),
     ] = math.nan
 
@@ -58,14 +57,23 @@ class SceneParams(NamedTuple):
         return 0.5 * (self.front.length + self.rear.length)
 
     @property
-    def wheel_plane(self) -> float:
-        """How far each wheel is from the middle between them, the front one to the left [m]."""
-        return 0.5 * (0.2 * self.hub_height if math.isnan(self.spacing) else self.spacing)
+    def wheel_planes(self) -> tuple[float, float]:
+        """Where the planes of the front and of the rear wheel are, to the left of the middle between them [m]."""
+        half = 0.5 * (SPACING * self.hub_height if math.isnan(self.spacing) else self.spacing)
+        return half, -half
 
-    @property
-    def tag_plane(self) -> float:
-        """Where the tags' plane is, to the left of the middle between the wheels [m]."""
-        return self.wheel_plane + TAG_STANDOFF * self.hub_height
+    def mounts(self, tags: TagParams) -> tuple[Mount, ...]:
+        """The tags, each with how far it is before its wheel.
+
+        Raises:
+            ValueError: as `dcdrw_msgs_py.tagging.mounts`.
+
+        """
+        return mounts(tags.resolved(self.hub_height, self.spacing))
+
+    def tag_plane(self, mount: Mount) -> float:
+        """Where a tag's plane is, to the left of the middle between the wheels [m]."""
+        return self.wheel_planes[mount.wheel != FRONT] + mount.standoff
 
 
 class ViewParams(NamedTuple):

@@ -52,18 +52,20 @@ def draw(
 
 
 class _Wheel:
-    """Maps the frame of a wheel to pixels, by its tags and the plane in which they lie."""
+    """Maps the plane of a wheel's feet to pixels, by its tags and how far they are before it."""
 
     def __init__(self, own: list[Detection], mounts: Mapping[int, Mount], camera: Camera, axes: PlaneAxes) -> None:
         shape = np.concatenate([seen(corners(mounts[one.id])) for one in own])
         flat = axes.flatten(camera.rays(np.concatenate([one.corners for one in own])))
         self._fit = fit_similarity(shape, flat)
+        self._standoff = mounts[own[0].id].standoff
         self._camera, self._axes = camera, axes
 
     def pixels(self, points: Any) -> Points | None:
         """Pixels of points of the wheel's frame (N, 2) [m], in units of 1/2^SHIFT; None where it is not in view."""
         c, s = self._fit
-        rays = self._axes.unflatten(c + s * seen(points))
+        # The tags are 1/|s| from the camera [m], the feet further by the standoff; both are brought to distance 1.
+        rays = self._axes.unflatten((c + s * seen(points)) / (1.0 + abs(s) * self._standoff))
         pixels = self._camera.project(np.column_stack((rays, np.ones(len(rays)))))
         if not (np.abs(pixels) < 1e5).all():
             return None
@@ -75,10 +77,8 @@ def _draw_wheel(
 ) -> None:
     pitch = 2.0 * shape.alpha
     standing = -pitch * stance(shape.alpha, view.rotation)[0]  # the spoke on which it stands
-    feet = [
-        (-shape.length * math.sin(angle), -shape.length * math.cos(angle))
-        for angle in standing + pitch * np.arange(round(math.tau / pitch))
-    ]
+    angles = standing + pitch * np.arange(round(math.tau / pitch))
+    feet = -shape.length * np.column_stack((np.sin(angles), np.cos(angles)))
     for index, foot in reversed(list(enumerate(feet))):
         line = wheel.pixels(((0.0, 0.0), foot))
         if line is not None:

@@ -95,7 +95,8 @@ class TagTracker:
     ) -> None:
         if detector not in get_args(Backend):
             raise ValueError(f'detector must be {" or ".join(get_args(Backend))}, got {detector!r}')
-        self.mounts = {mount.id: mount for mount in mounts(tags)}
+        length = 0.5 * (track.front.length + track.rear.length)
+        self.mounts = {mount.id: mount for mount in mounts(tags.resolved(length))}
         self._follower = TagFollower(TagDetector(tags.family, self.mounts, cast(Backend, detector)), self.mounts)
         self._view, self._slope = view, track.slope
         self._angles = WheelAngles(track, first_run)

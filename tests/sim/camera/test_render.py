@@ -11,7 +11,7 @@ from dcdrw_msgs_py.camera import Camera, write_camera
 from dcdrw_msgs_py.opencv import tag_cells, tag_dictionary
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.samples import CouplerSample, JointSample, Turn
-from dcdrw_msgs_py.tagging import TagGroup, TagParams, corners, mounts
+from dcdrw_msgs_py.tagging import TagGroup, TagParams, corners
 from dcdrw_sim.camera.render import LookParams, Renderer
 from dcdrw_sim.camera.scene import Floats, Footing, SceneParams, ViewParams, camera_pose
 from tests import ROOT
@@ -81,8 +81,8 @@ def test_tag_corners_are_where_the_camera_projects_the_geometry(view):
     footing = Footing(SCENE, joints)
     places = footing.places(joints.front.angle, joints.rear.angle)
     pose = camera_pose(SCENE, view.resolved(SCENE)).moved(0.5 * (places[0].along + places[1].along))
-    for mount, place in zip(mounts(TAGS), places, strict=True):
-        expected = view.make_camera().project(pose.optical(place.points(corners(mount), SCENE.tag_plane)))
+    for mount, place in zip(SCENE.mounts(TAGS), places, strict=True):
+        expected = view.make_camera().project(pose.optical(place.points(corners(mount), SCENE.tag_plane(mount))))
         assert renderer.tag_pixels(footing, joints)[mount.id] == pytest.approx(expected, abs=1e-9)
 
 
@@ -122,8 +122,8 @@ def test_tags_are_exact_to_a_fiftieth_of_a_pixel(view):
         footing = Footing(SCENE, joints)
         image = renderer.draw(footing, joints).astype(float)
         places = footing.places(joints.front.angle, joints.rear.angle)
-        for mount, place in zip(mounts(TAGS), places, strict=True):
-            square = renderer.pose(places).optical(place.points(corners(mount), SCENE.tag_plane))
+        for mount, place in zip(SCENE.mounts(TAGS), places, strict=True):
+            square = renderer.pose(places).optical(place.points(corners(mount), SCENE.tag_plane(mount)))
             exact, where = averaged(camera, square, tag_cells('36h11', mount.id), 8)
             # Fit drawn = a + b exact - exact's gradient · shift, on all pixels of the black square.
             down, across = np.gradient(exact)

@@ -76,7 +76,7 @@ def test_downhill_is_left_and_rolling_downhill_turns_counter_clockwise():
     uphill, here, downhill = pixels(SCENE, ViewParams(), [(x, 0.0, 0.9) for x in (-0.3, 0.0, 0.3)])
     assert downhill[0] < here[0] < uphill[0]
     assert downhill[1] > here[1] > uphill[1], 'the slope falls'
-    hub = np.array((0.0, SCENE.tag_plane, 1.0))
+    hub = np.array((0.0, SCENE.wheel_planes[0], 1.0))
     spoke = [
         np.subtract(*pixels(SCENE, ViewParams(), [WheelPlace(0.0, 1.0, psi).points((0.0, 0.3), hub[1]), hub]))
         for psi in (0.0, 0.4)

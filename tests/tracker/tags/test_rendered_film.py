@@ -35,7 +35,9 @@ def film(count: int) -> list[JointSample]:
 )
 def test_the_phase_is_within_the_figures_that_a_lab_is_promised(side, view, blur, degrees):
     camera = view.make_camera()
-    view = view._replace(distance=SCENE.tag_plane + float(camera.matrix[0, 0]) * TAGS.size / side)
+    view = view._replace(
+        distance=SCENE.tag_plane(SCENE.mounts(TAGS)[0]) + float(camera.matrix[0, 0]) * TAGS.size / side
+    )
     renderer = Renderer(SCENE, view, LookParams(exposure=0.001, blur_px=blur), TAGS, camera, False)
     follower = TagFollower(TagDetector(ids=(0, 1)), (0, 1))
     viewer = PairViewer(mounts(TAGS), camera, SCENE.slope, PairViewParams(roll_deg=view.roll_deg))
