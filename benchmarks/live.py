@@ -35,7 +35,7 @@ class Result(NamedTuple):
     cpu: float
     """Percent of a core."""
     resident: float
-    """At the end [MB]."""
+    """Memory of the process at the end [MB]."""
     growth: float
     """[MB]"""
     frames: float

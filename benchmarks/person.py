@@ -27,7 +27,7 @@ from dcdrw_sim.rig.simulator import SimulatedRig, SimulatorParams
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams
 
 PERIOD = 0.002
-"""From sample to sample, and from command to command [s]."""
+"""Time from sample to sample, and from command to command [s]."""
 BAND = 6.0
 """[% of a step]"""
 SETTLED = 3
@@ -38,11 +38,11 @@ class Row(NamedTuple):
     """What one walk came to."""
 
     rms: float
-    """Of 100 (p − 0.5) after the third step [% of a step]."""
+    """Root mean square of 100 (p − 0.5) after the third step [% of a step]."""
     in_band: float
     """Share of the time after the third step within the band [%]."""
     steps: int
-    """Of the person until the error stays in the band; beyond the walk's own where it does not."""
+    """The person's steps until the error stays in the band; more than the walk has where it does not."""
     peak: float
     """Force on the person [N]."""
     force: float

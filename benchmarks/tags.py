@@ -56,15 +56,15 @@ class Case(NamedTuple):
 
     name: str
     side: float
-    """Of the tags, about [px]."""
+    """Side of the tags, about [px]."""
     goal: float = math.inf
-    """Of φ's error [deg]; infinite: the film is to show how far it goes, and has no goals but n and pace."""
+    """Goal for the error of φ [deg]; infinite: the film shows how far it goes, and has goals for n and pace only."""
     view: ViewParams = ViewParams()
     look: LookParams = LookParams(exposure=0.001)
     lost: float = 0.0
     """Share of the frames that are lost at random."""
     seconds: float = 0.0
-    """Of the film; 0: as --seconds says."""
+    """Length of the film; 0: as --seconds says."""
 
 
 CASES = (

@@ -102,7 +102,7 @@ def with_ensemble(points: Points) -> Strikes:
 
 
 def with_simulation(points: Points) -> Strikes:
-    simulation.TOLERANCE = TAYLOR_TOLERANCE
+    simulation.PAIR_TOLERANCE = TAYLOR_TOLERANCE
     return simulated(points)
 
 
@@ -112,7 +112,7 @@ def simulated(points: Points) -> Strikes:
 
 
 def reference(points: Points) -> Strikes:
-    simulation.TOLERANCE = REFERENCE_TOLERANCE
+    simulation.PAIR_TOLERANCE = REFERENCE_TOLERANCE
     return simulated(points)
 
 

@@ -75,7 +75,7 @@ def read_rig(path: str | Path) -> RigParams:
     """The rig of a parameter file, as config/rig.yaml.
 
     Raises:
-        ValueError: it is no such file; the key that is wrong is named.
+        ValueError: it is not such a file; the key that is wrong is named.
         OSError: it cannot be read.
 
     """

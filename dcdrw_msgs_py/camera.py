@@ -258,7 +258,7 @@ _KALIBR_BESIDE = ('rostopic', 'cam_overlaps', 'T_cam_imu', 'T_imu_cam', 'T_cn_cn
 def _refuse_unknown(content: dict[Any, Any], known: Sequence[str], path: Path) -> None:
     for key in content:
         if key not in known:
-            raise ValueError(f'{path}: {key} is no key of a camera file{suggestion(key, known)}')
+            raise ValueError(f'{path}: {key} is not a key of a camera file{suggestion(key, known)}')
 
 
 def _calibration(content: dict[Any, Any], path: Path) -> Camera:

@@ -13,7 +13,7 @@ State = TypeVar('State', bound=Enum)
 Value = str | float | bool | Enum
 
 STATE = 'state'
-"""Of `sync_monitor` a `PairState`, of the simulator a `SourceState`, of the recorder a `RecorderState`."""
+"""Key of a state: `PairState` of `sync_monitor`, `SourceState` of the simulator, `RecorderState` of the recorder."""
 PHASE, PHASE_OF_STRIDE = 'phase [%]', 'phase of a stride [%]'
 ERROR, ERROR_DEG = 'error [%]', 'error [deg]'
 LOWEST_ERROR, HIGHEST_ERROR = 'lowest error within the last step [%]', 'highest error within the last step [%]'
@@ -58,7 +58,7 @@ class PairState(str, Enum):
     SLIPPED = 'slipped'
     """A wheel has just struck twice in a row."""
     LOST = 'lost'
-    """The pair was in step, and is no more."""
+    """The pair was in step, and is no longer."""
     SYNCHRONIZED = 'synchronized'
     CONVERGING = 'converging'
 

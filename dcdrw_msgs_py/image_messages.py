@@ -87,7 +87,7 @@ def _rows(message: Any, height: int, row: int, step: int) -> Picture:
     data = np.frombuffer(message.data, np.uint8)
     if not (row and height) or step < row or data.size < step * (height - 1) + row:
         raise ValueError(
-            f'{data.size} bytes in rows of {step} are no {message.encoding} picture of {message.width}x{height}'
+            f'{data.size} bytes in rows of {step} are not a {message.encoding} picture of {message.width}x{height}'
         )
     return np.lib.stride_tricks.as_strided(data, (height, row), (step, 1), writeable=False)
 
@@ -104,14 +104,14 @@ def compressed_frame(message: Any) -> Frame:
     """The frame in a CompressedImage (JPEG, PNG and what else OpenCV decodes).
 
     Raises:
-        ValueError: the data are no picture.
+        ValueError: the data are not a picture.
 
     """
     cv2 = opencv()
     data = np.frombuffer(message.data, np.uint8)
     image = cv2.imdecode(data, cv2.IMREAD_ANYCOLOR) if data.size else None
     if image is None:
-        raise ValueError(f'{data.size} bytes of format {message.format!r} are no picture that OpenCV decodes')
+        raise ValueError(f'{data.size} bytes of format {message.format!r} are not a picture that OpenCV decodes')
     return Frame(stamp_ns(message.header.stamp), np.asarray(image, np.uint8))
 
 

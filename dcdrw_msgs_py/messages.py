@@ -157,7 +157,7 @@ class PhaseSampleReader:
         """The sample in a message.
 
         Raises:
-            ValueError: as `Joints.read`, or a step difference that is no number.
+            ValueError: as `Joints.read`, or a step difference that is not a number.
 
         """
         front, rear, phi, (difference, *_), *counts = self._joints.read(message)
@@ -236,7 +236,7 @@ def footfall(message: Any, wheel: str) -> Footfall:
     """The strike in a message of a wheel's footfalls.
 
     Raises:
-        ValueError: its place is no number.
+        ValueError: its place is not a number.
 
     """
     if not math.isfinite(message.point.x):

@@ -241,7 +241,7 @@ def dropped(node: Node) -> dict[str, int]:
     return {name: box.dropped for name, box in inboxes.items() if isinstance(box, Inbox) and box.dropped}
 
 
-def report(node: Node, diagnose: Callable[[], Diagnosis]) -> Callable[[], None]:
+def publish_diagnosis(node: Node, diagnose: Callable[[], Diagnosis]) -> Callable[[], None]:
     """Publish a node's diagnosis once a second, by a clock that goes on where simulated time stands still.
 
     Returns:

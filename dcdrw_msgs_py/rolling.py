@@ -39,7 +39,7 @@ def rotation(alpha: float, spoke: Real, theta: Real) -> Real:
 
 
 def steps_ahead(front: Pitched, rear: Pitched, psi1: Value, psi2: Value) -> Value:
-    """By how many steps the front wheel is ahead, ψ1/2α1 − ψ2/2α2; of speeds, the rate of that."""
+    """Steps by which the front wheel is ahead, ψ1/2α1 − ψ2/2α2; given speeds, the rate of that."""
     return psi1 / (2.0 * front.alpha) - psi2 / (2.0 * rear.alpha)
 
 

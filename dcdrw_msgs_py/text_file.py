@@ -27,7 +27,7 @@ def read_text(path: Path, largest: int = LARGEST_TEXT) -> str:
         return data.decode('utf-8-sig')
     except UnicodeDecodeError as error:
         line = data.count(b'\n', 0, error.start) + 1
-        raise ValueError(f'{path}, line {line}: byte 0x{data[error.start]:02x} is no UTF-8 text') from None
+        raise ValueError(f'{path}, line {line}: byte 0x{data[error.start]:02x} is not UTF-8 text') from None
 
 
 def read_rows(path: Path) -> Iterator[tuple[int, list[str]]]:

@@ -19,7 +19,7 @@ class Topic(NamedTuple):
 
 
 SIDES = ('left', 'right')
-"""Of the person in front, and of the robot behind."""
+"""Sides of the person in front and of the robot behind."""
 # 1000 messages are a second at 1 kHz: a reader that stalls for 50 ms loses nothing.
 SAMPLE_DEPTH = 1000
 

@@ -20,10 +20,10 @@ class Functions(Protocol):
     """Sine and its kin."""
 
     def sin(self, x: Real, /) -> Real:
-        """Of an angle [rad]."""
+        """Sine of an angle [rad]."""
 
     def cos(self, x: Real, /) -> Real:
-        """Of an angle [rad]."""
+        """Cosine of an angle [rad]."""
 
     def tanh(self, x: Real, /) -> Real:
         """The hyperbolic tangent."""
@@ -33,7 +33,7 @@ class Functions(Protocol):
 
 
 def functions_of(value: Real) -> Functions:
-    """Of a plain number those of `math`, at a tenth of the cost; of an array numpy's."""
+    """The functions of `math` for a plain number, at a tenth of the cost; numpy's for an array."""
     return math if isinstance(value, float) else np
 
 

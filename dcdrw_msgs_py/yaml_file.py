@@ -84,7 +84,7 @@ class _Dumper(_Scalars, getattr(yaml, 'CSafeDumper', yaml.SafeDumper)):  # type:
 def _number(loader: Any, node: Any) -> int | float:
     found = number(node.value)
     if found is None:
-        raise yaml.constructor.ConstructorError(None, None, f'{node.value!r} is no number', node.start_mark)
+        raise yaml.constructor.ConstructorError(None, None, f'{node.value!r} is not a number', node.start_mark)
     return found
 
 

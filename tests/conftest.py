@@ -11,7 +11,7 @@ from tests import ROOT
 from tests.bench import Bench
 from tests.trials import STIFF
 
-# A busy machine is no counterexample.
+# A busy machine is not a counterexample.
 settings.register_profile('patient', deadline=None)
 settings.load_profile('patient')
 

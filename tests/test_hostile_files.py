@@ -64,7 +64,7 @@ def test_rig_files_gone_wrong_are_refused(tmp_path_factory, content, reason):
     ('content', 'reason'),
     [
         (b'kind,value,name\nspring,5,"x\n' + b'y' * 200_000 + b'\ndashpot,5,y\n', 'field larger than'),
-        (b'kind,value,name\nspring,5,\xff\xfe\ndashpot,5,y\n', 'line 2: byte 0xff is no UTF-8 text'),
+        (b'kind,value,name\nspring,5,\xff\xfe\ndashpot,5,y\n', 'line 2: byte 0xff is not UTF-8 text'),
     ],
 )
 def test_tables_gone_wrong_are_refused(tmp_path_factory, content, reason):

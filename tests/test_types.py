@@ -1,4 +1,4 @@
-"""What is no physics does not pass the type checker."""
+"""What is not physics does not pass the type checker."""
 
 import subprocess
 import sys

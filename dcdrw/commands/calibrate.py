@@ -11,7 +11,7 @@ import numpy as np
 from dcdrw.console import Interrupted, add_json, check_json, tell
 from dcdrw.files import add_force, refuse_existing, write_whole
 from dcdrw.suite.parameter_file import write_changed
-from dcdrw.trials.filmed import Film, add_film_arguments
+from dcdrw.trials.filmed import TrackedVideo, add_film_arguments
 from dcdrw_msgs_py.rig import FRONT, REAR, WheelShape
 from dcdrw_msgs_py.tagging import TagGroup
 from dcdrw_tracker.node.tag_tracker import Tracked
@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
     refuse_existing([options.out], options.force)
     check_json(options)
-    film = Film(options)
+    film = TrackedVideo(options)
     frames = [tracked for _, tracked in film.track()]
     if film.interrupted:
         raise Interrupted(film.interrupted[0])
@@ -73,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _views(film: Film, frames: Sequence[Tracked]) -> tuple[list[PairView], PlaneAxes]:
+def _views(film: TrackedVideo, frames: Sequence[Tracked]) -> tuple[list[PairView], PlaneAxes]:
     view, slope = film.params.view, film.params.track.slope
     viewer = PairViewer(film.tracker.mounts.values(), film.camera, slope, view)
     for _ in range(PASSES):
@@ -81,7 +81,7 @@ def _views(film: Film, frames: Sequence[Tracked]) -> tuple[list[PairView], Plane
     return views, viewer.plane.axes(math.radians(view.roll_deg))
 
 
-def _changes(film: Film, found: Calibration, axes: PlaneAxes, learn_slope: bool) -> Iterator[tuple[str, Any]]:
+def _changes(film: TrackedVideo, found: Calibration, axes: PlaneAxes, learn_slope: bool) -> Iterator[tuple[str, Any]]:
     """The parameters that the calibration changes, by name."""
     tags, _, track, _ = film.params
     if learn_slope:
@@ -120,7 +120,7 @@ class _Line(NamedTuple):
     unit: str
 
 
-def _lines(film: Film, found: Calibration, changes: dict[str, Any]) -> Iterator[str]:
+def _lines(film: TrackedVideo, found: Calibration, changes: dict[str, Any]) -> Iterator[str]:
     """What was found beside what was configured."""
     tags, view, track, _ = film.params
     lines = []

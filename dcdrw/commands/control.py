@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
     chosen = law(found, options.method, 0.01 * SyncParams().band_percent, options.max_force)
     edges = margins(found, chosen)
     parameters = _parameters(rig, chosen, options)
-    tell(options, _report(found, chosen, edges), _record(found, chosen, edges, parameters))
+    tell(options, _summary_lines(found, chosen, edges), _json_record(found, chosen, edges, parameters))
     if options.out:
         write_text(options.out, yaml_text({'/**': {'ros__parameters': parameters}}), options.force)
         print(f'written: {options.out}')
@@ -93,7 +93,7 @@ def _parameters(rig: RigParams, chosen: Law, options: argparse.Namespace) -> dic
     }
 
 
-def _report(found: Plant, chosen: Law, edges: Margins) -> Iterator[str]:
+def _summary_lines(found: Plant, chosen: Law, edges: Margins) -> Iterator[str]:
     state = chosen.state
     yield (
         f'aim           θ2 = {math.degrees(state.theta2):.3f}°, θ1′ = {state.omega1:.4f} rad/s, '
@@ -115,7 +115,7 @@ def _edge(value: float, unit: str) -> str:
     return f'from {value:.3g} {unit} on' if math.isfinite(value) else f'nowhere found in {unit}'
 
 
-def _record(found: Plant, chosen: Law, edges: Margins, parameters: dict[str, Any]) -> dict[str, Any]:
+def _json_record(found: Plant, chosen: Law, edges: Margins, parameters: dict[str, Any]) -> dict[str, Any]:
     """Everything for a program, in SI units and radians."""
     return {
         'parameters': parameters,

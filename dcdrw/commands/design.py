@@ -24,7 +24,7 @@ from dcdrw_sim.model.start import start
 from dcdrw_sim.study.design import (
     CASES,
     GRID,
-    TOLERANCE,
+    PART_TOLERANCE,
     VARIED,
     WIDEST,
     WORK,
@@ -96,7 +96,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     coupler.add_argument(
         '--tolerance',
         type=positive,
-        default=100.0 * TOLERANCE,
+        default=100.0 * PART_TOLERANCE,
         metavar='PERCENT',
         help='what k and b may be off by (default: %(default)g)',
     )
@@ -144,8 +144,8 @@ def run(options: argparse.Namespace) -> int:
     if options.k:
         chosen[GIVEN] = assess(task, options.k, options.b, tolerance)
     seen = {name: by_monitor(task, found) for name, found in chosen.items()}
-    found = record(task, chosen, seen, parts, tolerance)
-    tell(options, report(task, chosen, seen, parts, tolerance), found)
+    found = json_record(task, chosen, seen, parts, tolerance)
+    tell(options, summary_lines(task, chosen, seen, parts, tolerance), found)
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
         write_text(options.out / 'design.json', to_json(found), options.force)
@@ -238,7 +238,7 @@ def _best_parts(task: Task, parts: list[Part], tolerance: float, bar: Bar) -> li
     return [(float(ks[index]), float(bs[index])) for index in (first, near)]
 
 
-def report(
+def summary_lines(
     task: Task,
     chosen: dict[str, Assessment],
     seen: dict[str, Steps],
@@ -320,7 +320,7 @@ def _texts(task: Task, chosen: dict[str, Assessment], parts: list[Part], toleran
     }
 
 
-def record(
+def json_record(
     task: Task,
     chosen: dict[str, Assessment],
     seen: dict[str, Steps],

@@ -7,7 +7,7 @@ from typing import Any
 from dcdrw.console import Bar, interrupted_status, interruptible, number, phase_percent, positive
 from dcdrw.files import add_force, refuse_existing
 from dcdrw.suite.parameter_file import add_rig_options, with_rig_options
-from dcdrw.trials.shots import CODECS, Files, FilmParams, film
+from dcdrw.trials.shots import CODECS, Files, FilmParams, film_trial
 from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.quantity import Field, Params, build, check, fields, flatten
 from dcdrw_msgs_py.rig import WheelShape
@@ -84,11 +84,11 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f'--out must end in {", ".join(CODECS)}, got {files.video}')
     refuse_existing(files, options.force)
     if not files.video.parent.is_dir():
-        raise ValueError(f'{files.video.parent} is no folder; make it first, or choose another --out')
+        raise ValueError(f'{files.video.parent} is not a folder; make it first, or choose another --out')
     count = max(1, round(options.seconds * options.fps))
     with interruptible() as interrupted, Bar('filming', 'frames', options.quiet) as bar:
         bar.begin(count)
-        filmed = film(
+        filmed = film_trial(
             params,
             files,
             count,

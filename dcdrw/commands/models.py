@@ -20,7 +20,7 @@ from dcdrw_sim.relatives import rigid_pair, rimless_wheel
 from dcdrw_sim.relatives.footfall_order import order, rear_lead, steady_contacts
 from dcdrw_sim.relatives.rigid_pair import NEAR_TOGETHER, RigidPair
 
-PHASES = (0.0, NEAR_TOGETHER, 0.25, 0.5, 0.75)
+RIGID_PAIR_PHASES = (0.0, NEAR_TOGETHER, 0.25, 0.5, 0.75)
 GAITS = (0.0, 0.25, 0.5, 0.75)
 BANDS = 3
 PICTURES = 'wheel', 'pair', 'footfalls'
@@ -53,8 +53,8 @@ def run(options: argparse.Namespace) -> int:
         new_figure(1, 1)
         files = figure_files(options.out, PICTURES, options.formats)
         refuse_existing([options.out / 'models.json', *files], options.force)
-    found = record(rig)
-    tell(options, report(found), found)
+    found = json_record(rig)
+    tell(options, summary_lines(found), found)
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
         write_text(options.out / 'models.json', to_json(found), options.force)
@@ -65,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def record(rig: RigParams) -> dict[str, Any]:
+def json_record(rig: RigParams) -> dict[str, Any]:
     """Everything for a program, in SI units and radians; None where there is no such thing.
 
     Args:
@@ -113,7 +113,10 @@ def _wheel(wheel: WheelParams, rig: RigParams) -> dict[str, Any]:
 
 def _rigid_pair(rig: RigParams) -> dict[str, Any]:
     velocity = RigidPair(rig, 0.5).gait().velocity
-    found: dict[str, Any] = {'bar': rig.D0, 'phases': [_rigid_gait(rig, phase, velocity) for phase in PHASES]}
+    found: dict[str, Any] = {
+        'bar': rig.D0,
+        'phases': [_rigid_gait(rig, phase, velocity) for phase in RIGID_PAIR_PHASES],
+    }
     if any(gait['velocity'] for gait in found['phases']):
         phase = rigid_pair.fastest_phase(rig)
         found['fastest'] = {'phase': phase, 'velocity': RigidPair(rig, phase).gait().velocity}
@@ -131,7 +134,7 @@ def _rigid_gait(rig: RigParams, phase: float, velocity: float) -> dict[str, Any]
         'velocity': _known(gait.velocity),
         'period': _known(gait.period),
         'multiplier': pair.multiplier,
-        'gentlest_slope': _known(rigid_pair.gentlest_slope(rig, phase)),
+        'gentlest_slope': _known(rigid_pair.gentlest_slope_at_phase(rig, phase)),
         'slope_at_velocity_of_50_percent': _known(slope),
         'energy_per_metre_at_velocity_of_50_percent': _known(rigid_pair.energy_per_metre(rig._replace(slope=slope))),
         'pull': max(0.0, -min(feet) / max(feet)) if feet else None,
@@ -149,7 +152,7 @@ def _coupled_pair(rig: RigParams) -> dict[str, Any]:
     }
 
 
-def report(found: dict[str, Any]) -> Iterator[str]:
+def summary_lines(found: dict[str, Any]) -> Iterator[str]:
     """Lines for a person."""
     wheels = found['wheels']
     if wheels[FRONT] == wheels[REAR]:

@@ -34,12 +34,12 @@ def run(options: argparse.Namespace) -> int:
     check_json(options)
     rig = chosen_params(options).rig.resolved()
     found = walking(rig)
-    lines = (f'{heading:<12} {content}' for heading, content in report(rig, found))
+    lines = (f'{heading:<12} {content}' for heading, content in summary_lines(rig, found))
     tell(options, lines, {'parameters': flatten(rig)} | _plain(found))
     return 0
 
 
-def report(rig: RigParams, found: Walking) -> Iterator[tuple[str, str]]:
+def summary_lines(rig: RigParams, found: Walking) -> Iterator[tuple[str, str]]:
     """Lines for a person: a heading, and its content."""
     plain = nondimensional(rig)[0]
     yield 'coupler', f'{rig.k:.4g} N/m, {rig.b:.4g} N·s/m: k̂ = {plain.k:.4g}, b̂ = {plain.b:.4g}'

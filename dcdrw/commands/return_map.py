@@ -13,7 +13,7 @@ from dcdrw.suite.parameter_file import add_rig_options, chosen_params
 from dcdrw_msgs_py.in_step import BAND_PERCENT
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_sim.map.limit_cycles import find_limit_cycles
-from dcdrw_sim.map.regression import BAND, PHASES, STEPS, Convergence, Regression, measure
+from dcdrw_sim.map.regression import BAND, STEPS, TRIAL_PHASES, Convergence, Regression, measure
 from dcdrw_sim.map.return_map import Complexes, ReturnMap
 from dcdrw_sim.motion.ensemble import spread
 from dcdrw_sim.study.points import Points, study
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=count,
         default=STEPS,
         metavar='N',
-        help=f'steps of each of the {len(PHASES)} trials (default: %(default)s)',
+        help=f'steps of each of the {len(TRIAL_PHASES)} trials (default: %(default)s)',
     )
     add_json(parser)
     add_force(parser)
@@ -51,12 +51,12 @@ def run(options: argparse.Namespace) -> int:
     seconds = options.steps * convergence.fixed_point.period
     phases = tuple(trial.phase for trial in convergence.trials)
     points = study(spread(return_map.rig, 1, {}), seconds, phases)
-    lines = (f'{name:<13} {content}' for name, content in report(return_map, convergence, points))
-    tell(options, lines, record(return_map, convergence, points))
+    lines = (f'{name:<13} {content}' for name, content in summary_lines(return_map, convergence, points))
+    tell(options, lines, json_record(return_map, convergence, points))
     return 0
 
 
-def report(return_map: ReturnMap, convergence: Convergence, points: Points) -> Iterator[tuple[str, str]]:
+def summary_lines(return_map: ReturnMap, convergence: Convergence, points: Points) -> Iterator[tuple[str, str]]:
     """Lines for a person: a heading, empty where the last one goes on, and its content.
 
     Args:
@@ -106,8 +106,8 @@ def report(return_map: ReturnMap, convergence: Convergence, points: Points) -> I
             yield '', f'from {100 * trial.phase:.0f} %: {trial.trouble}'
 
 
-def record(return_map: ReturnMap, convergence: Convergence, points: Points) -> dict[str, Any]:
-    """Everything for a program; SI units and radians, but where a name says otherwise. Arguments as of `report`."""
+def json_record(return_map: ReturnMap, convergence: Convergence, points: Points) -> dict[str, Any]:
+    """Everything for a program; SI units and radians, but where a name says otherwise. Arguments as `summary_lines`."""
     fixed, raw, affine, trials = convergence
     phase = _phase(return_map, convergence)
     return {

@@ -11,7 +11,7 @@ from dcdrw.console import Bar, add_json, check_json, cores, count, positive, tel
 from dcdrw.files import add_force
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params
 from dcdrw_msgs_py.in_step import BAND_PERCENT
-from dcdrw_sim.map.regression import PHASES
+from dcdrw_sim.map.regression import TRIAL_PHASES
 from dcdrw_sim.study.sweep import Axis, Sweep, default_axis, default_seconds
 from dcdrw_sim.study.sweep_dataset import open_sweep, require_extra
 from dcdrw_sim.study.sweep_run import run_sweep
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--starts',
         type=count,
-        default=len(PHASES),
+        default=len(TRIAL_PHASES),
         metavar='N',
         help='initial phases, evenly spaced between 0 and 100 %% (default: %(default)s)',
     )

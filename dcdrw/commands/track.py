@@ -15,7 +15,7 @@ from dcdrw.recordings.joint_recording import record_joints
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw.trials.analysis import Analysis, analyze
 from dcdrw.trials.expectation import add_expect, expectation_status
-from dcdrw.trials.filmed import Film, add_film_arguments, debug_video, joint_batches, quality, write_frames
+from dcdrw.trials.filmed import TrackedVideo, add_film_arguments, debug_video, joint_batches, quality, write_frames
 from dcdrw.trials.results import result, write_results
 from dcdrw.trials.summary import sentence
 from dcdrw_msgs_py.rig import FRONT, REAR
@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
-    film = Film(options)
+    film = TrackedVideo(options)
     trial_params = TrialParams()
     if options.rig:
         trial_params = read_parameter_file(options.rig, trial_params)
@@ -91,7 +91,9 @@ def run(options: argparse.Namespace) -> int:
     return _finish(film, frames, trial, folder, options)
 
 
-def _finish(film: Film, frames: Sequence[Tracked], trial: Analysis, folder: Path, options: argparse.Namespace) -> int:
+def _finish(
+    film: TrackedVideo, frames: Sequence[Tracked], trial: Analysis, folder: Path, options: argparse.Namespace
+) -> int:
     """Tell and write what came of it."""
     told = quality(film, frames)
     missing = f'; {told["frames_missing"]} frames are missing' if told['frames_missing'] else ''

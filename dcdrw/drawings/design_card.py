@@ -13,7 +13,7 @@ from dcdrw_sim.study.verdict import Verdict
 A4 = 8.27, 11.69
 """[inch]"""
 COLOURS = VERMILION, BLUE, PINK
-"""In the order of the couplers."""
+"""Colours of the couplers, in their order."""
 MARKERS = '*', 'o', 'D'
 LONGEST = 60
 """Steps that the page shows."""

@@ -140,7 +140,7 @@ class RigView:
         side = {FRONT: 0.1 * size, REAR: -0.1 * size}  # in one plane the spokes would pass through each other
 
         def place(along: float, y: float, above: float) -> Point:
-            return turned((along - origin, y, above), params.slope)
+            return rotated((along - origin, y, above), params.slope)
 
         yield Shape(
             'slope',
@@ -213,7 +213,7 @@ def about_y(turn: float) -> Quaternion:
     return 0.0, math.sin(0.5 * turn), 0.0, math.cos(0.5 * turn)
 
 
-def turned(point: Point, turn: float) -> Point:
+def rotated(point: Point, turn: float) -> Point:
     """A point turned about y, as `about_y` does."""
     x, y, z = point
     return x * math.cos(turn) + z * math.sin(turn), y, z * math.cos(turn) - x * math.sin(turn)
@@ -221,7 +221,7 @@ def turned(point: Point, turn: float) -> Point:
 
 def leg(length: float, angle: float) -> Point:
     """The tip of a leg in the frame of its hub, whose leg 0 points down; the others follow in the sense of θ."""
-    return turned((0.0, 0.0, -length), angle)
+    return rotated((0.0, 0.0, -length), angle)
 
 
 def coupler_lines(length: float, width: float) -> Iterator[Point]:

@@ -18,7 +18,7 @@ from dcdrw_tracker.gait.rest import moves
 from dcdrw_tracker.gait.sync import SyncMonitor, SyncParams
 
 HEARTBEAT_SECONDS = 0.04
-"""From one enable to the next [s]."""
+"""Period of the heartbeat on `enable` [s]."""
 
 
 class Observer(Node):

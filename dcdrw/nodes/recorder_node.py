@@ -24,7 +24,7 @@ from dcdrw.recordings.recorder import (
 from dcdrw.suite.executables import EXECUTABLES, RECORDED, RECORDER
 from dcdrw.suite.recorder_params import RecorderParams
 from dcdrw_msgs_py.diagnosis import STATE, Diagnosis, Level, RecorderState, messages_of, parameters_of
-from dcdrw_msgs_py.node import Parameters, message_type, report, run, steady_clock
+from dcdrw_msgs_py.node import Parameters, message_type, publish_diagnosis, run, steady_clock
 from dcdrw_msgs_py.quantity import fields
 from dcdrw_msgs_py.topics import SAMPLE_DEPTH, Topic
 from dcdrw_msgs_py.yaml_file import yaml_text
@@ -59,7 +59,7 @@ class RecorderNode(Node):
             name, _, kind = word.partition(':')
             self._wanted[self.resolve_topic_name(name)] = Topic(name, kind, '')
         self.create_service(SetBool, '~/record', self._on_record)
-        self._report = report(self, self._diagnose)
+        self._report = publish_diagnosis(self, self._diagnose)
         self.create_timer(LOOK_SECONDS, self._look, clock=steady_clock())
         self.create_timer(FLUSH_SECONDS, self._flush, clock=steady_clock())
         if self._settings.value.record:

@@ -12,7 +12,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from dcdrw.drawings.rig_markers import MarkerParams, RigView, Shape, about_y
 from dcdrw_msgs_py.diagnosis import Diagnosis, Level
 from dcdrw_msgs_py.messages import JointSampleReader, diagnoses
-from dcdrw_msgs_py.node import Age, Parameters, advertise, follow_runs, listen, report, run, steady_clock
+from dcdrw_msgs_py.node import Age, Parameters, advertise, follow_runs, listen, publish_diagnosis, run, steady_clock
 from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, RIG_MARKERS
 
 STALE_AFTER = 1.0
@@ -39,7 +39,7 @@ class RigMarkersNode(Node):
         self._drawn_run = 0
         self._drawings = 0
         self._sample_age, self._drawn_age, self._says_age = Age(), Age(), Age()
-        report(self, self._diagnose)
+        publish_diagnosis(self, self._diagnose)
         self.create_timer(1.0 / params.redraw_rate, self._tick, clock=steady_clock())
         listen(self, DIAGNOSTICS, self._on_diagnostics)
         follow_runs(self, self._reader.runs)

@@ -28,7 +28,7 @@ def make_nodes(names: tuple[str, ...]) -> list[Node]:
     known = [executable.name for executable in EXECUTABLES]
     for name in names:
         if name not in known:
-            raise ValueError(f'{name} is no node of the suite; there are {", ".join(known)}')
+            raise ValueError(f'{name} is not a node of the suite; there are {", ".join(known)}')
     share_process()
     return [_node_class(executable.module)() for executable in EXECUTABLES if executable.name in names]
 

@@ -51,7 +51,7 @@ _MATCHED = 1000
 LATE_DATA = 'late_data'
 """The state where samples came, but not of late; a page that hears nothing of `dcdrw live` is itself late."""
 LONGEST_MESSAGE = 200
-"""Of what a node says of itself, so much is shown [characters]."""
+"""Length up to which the message of a node is shown [characters]."""
 
 _LEFT_OUT = (LOST_SAMPLES, 'missing'), (REFUSED, 'refused'), (RESTARTS, 'times begun anew')
 _SUITE = {node.name for node in EXECUTABLES}
@@ -69,9 +69,9 @@ class Command(NamedTuple):
     do: str
     """`set`, `reset`, `pause` or `record`."""
     name: str = ''
-    """Of the parameter to set."""
+    """Name of the parameter to set."""
     value: float = 0.0
-    """To set it to, SI units; else true or false."""
+    """The value to set, in SI units; for a switch, true or false."""
 
 
 def read_command(text: str) -> Command:

@@ -17,7 +17,7 @@ class Message(NamedTuple):
     log_ns: int
     """When the recorder got it."""
     data: bytes
-    """As it came off the wire (CDR)."""
+    """The message as it came off the wire (CDR)."""
 
 
 class RecordedTopic(NamedTuple):
@@ -26,11 +26,11 @@ class RecordedTopic(NamedTuple):
     name: str
     type: str
     hash: str = ''
-    """Of the type (RIHS01)."""
+    """Hash of the type (RIHS01)."""
     qos: str = ''
     """What its publishers offer, as YAML."""
     definition: str = ''
-    """Of the type, with those of the types within it; empty where it is not known."""
+    """Definition of the type and of the types within it; empty where it is not known."""
     definition_format: str = ''
     """`ros2msg` or `ros2idl`."""
     serialization: str = CDR

@@ -43,7 +43,7 @@ def find_bag(path: Path) -> Bag:
     if not path.is_dir():
         if not is_storage(path):
             raise ValueError(
-                f'{path} is no recording: give its folder, or a file that ends in {", ".join(STORAGES)}, '
+                f'{path} is not a recording: give its folder, or a file that ends in {", ".join(STORAGES)}, '
                 f'or one of these and {COMPRESSIONS[0]}'
             )
         return Bag(path, [path], [], {}, 0)
@@ -54,7 +54,7 @@ def find_bag(path: Path) -> Bag:
             return _described(folder, files)
     if (path / METADATA).exists():
         raise ValueError(f'{path} has {METADATA} but none of the files that this tells of')
-    raise ValueError(f'{path} is no recording: it has no {", ".join(f"*{end}" for end in STORAGES)} file')
+    raise ValueError(f'{path} is not a recording: it has no {", ".join(f"*{end}" for end in STORAGES)} file')
 
 
 def is_storage(path: Path) -> bool:

@@ -33,7 +33,7 @@ from dcdrw.recordings.decompression import LARGEST, decompress
 
 MAGIC = b'\x89MCAP0\r\n'
 _HEAD = struct.Struct('<BQ')
-"""Of every record: its kind, and the length of what follows."""
+"""The head of a record: its kind, and the length of what follows."""
 _CHUNK = struct.Struct('<QQQII')
 """First and last log time, size and checksum of the records, length of the compression's name."""
 _MESSAGE = struct.Struct('<BQHIQ')
@@ -74,7 +74,7 @@ class _Piece(NamedTuple):
     start_ns: int
     compression: str = ''
     plain_size: int = -1
-    """Of the records within; -1: as many as there are."""
+    """Size of the records within, uncompressed; -1: as much as there is."""
     checksum: int = 0
 
 
@@ -82,7 +82,7 @@ class McapFile(BagFile):
     """An open MCAP file.
 
     Raises:
-        ValueError: it is no MCAP file.
+        ValueError: it is not an MCAP file.
         OSError: it cannot be read.
 
     """
@@ -412,7 +412,7 @@ class McapFile(BagFile):
             return f'{self.name} is a pointer of Git LFS, not the recording itself: run git lfs pull'
         if start.startswith(MAGIC):
             return f'{self.name} ends before its first message: nothing was recorded'
-        return f'{self.name} is {"empty" if not start else "no MCAP file"}'
+        return f'{self.name} is {"empty" if not start else "not an MCAP file"}'
 
 
 def _log_ns(message: Message) -> int:

@@ -118,7 +118,7 @@ class Recorder:
         self._types = get_typestore(Stores.ROS2_JAZZY)
         self._topics: dict[str, RecordedTopic] = {}
         self._channels: dict[str, int] = {}
-        """Of the topics that have a message: what nobody speaks of is no topic of the recording."""
+        """Channels of the topics that have a message; a topic without one is left out of the recording."""
         self._schemas: dict[str, int] = {}
         self._described = b''
         """New topics, for the file to name them outside of the chunk that does: a damaged chunk costs none its name."""

@@ -37,7 +37,7 @@ class SqliteFile(BagFile):
         scratch: an empty folder for a copy, which the caller removes.
 
     Raises:
-        ValueError: it is no recording.
+        ValueError: it is not a recording.
         OSError: it cannot be read, or not be copied.
 
     """
@@ -50,7 +50,7 @@ class SqliteFile(BagFile):
             raise ValueError(f'{name} is a pointer of Git LFS, not the recording itself: run git lfs pull')
         journals = [journal for journal in _journals(path) if journal.stat().st_size]
         if not journals and not start.startswith(_MAGIC):
-            raise ValueError(f'{name} is {"no sqlite3 file" if start else "empty"}')
+            raise ValueError(f'{name} is {"not an sqlite3 file" if start else "empty"}')
         if journals:
             path = _copy(path, scratch / 'copy.db3')
         self.closed = not journals
@@ -90,7 +90,7 @@ class SqliteFile(BagFile):
             connection.setlimit(_LIMIT_LENGTH, LARGEST)
         tables = {name for name, kind in self._query('SELECT name, type FROM sqlite_master') if kind == 'table'}
         if not {'topics', 'messages'} <= tables:
-            raise ValueError(f'{self.name} is no recording: it has no table of topics, or none of messages')
+            raise ValueError(f'{self.name} is not a recording: it has no table of topics, or none of messages')
         self._names: dict[int, str] = {}
         definitions: dict[str, tuple[str, str]] = {}
         if 'message_definitions' in tables:

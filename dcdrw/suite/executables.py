@@ -65,7 +65,7 @@ class Executable(NamedTuple):
     publishes: tuple[Topic, ...]
     services: tuple[str, ...] = ()
     by_choice: tuple[Topic, ...] = ()
-    """Of the topics, those that only other parameters than the default ones bring."""
+    """Those of the topics that the default parameters leave out."""
 
     @property
     def module(self) -> str:

@@ -12,7 +12,7 @@ from dcdrw_sim.model.wheel import inertia
 from dcdrw_tracker.gait.sync import SyncParams
 
 ANGLES = 33
-"""At which the free gait is told."""
+"""Number of angles at which the free gait is told."""
 
 
 def hub_gains(

@@ -115,7 +115,7 @@ class RigOption(NamedTuple):
     unit: str
     help: str
     scale: float = 1.0
-    """From the option's unit to the parameter's."""
+    """Factor from the option's unit to the parameter's."""
 
 
 RIG_OPTIONS = {

@@ -26,7 +26,7 @@ _JOINTS = (FRONT_STANCE, REAR_STANCE, PHI_JOINT, STEP_DIFFERENCE_JOINT)
 
 
 class Agreement(NamedTuple):
-    """Of one topic."""
+    """How many messages of one topic agree with what is computed here."""
 
     recorded: int
     """Messages."""

@@ -33,11 +33,11 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
-class Motion(NamedTuple):
+class MotionTable(NamedTuple):
     """Columns of one length: a row for each joint state that the estimator took, and what it made of it."""
 
     stamp_ns: Integers
-    """By the source's clock as it was first: where it was set later, that is undone."""
+    """Stamps by the source's clock as it was at first: a clock that was set later is set back."""
     rotation1: Floats
     """ψ1 as it was measured, in rad."""
     rotation2: Floats
@@ -65,9 +65,9 @@ class Motion(NamedTuple):
     synchronized: NDArray[np.bool_]
     """The monitor's verdict."""
 
-    def rows(self, part: Any) -> 'Motion':
+    def rows(self, part: Any) -> 'MotionTable':
         """These rows of every column."""
-        return Motion(*(column[part] for column in self))
+        return MotionTable(*(column[part] for column in self))
 
     @property
     def seconds(self) -> Floats:
@@ -89,9 +89,9 @@ class Analysis(NamedTuple):
     """A trial, from its joint states alone."""
 
     params: TrialParams
-    motion: Motion
-    """From the last sample before the wheels move."""
-    held: Motion
+    motion: MotionTable
+    """The rows from the last sample before the wheels move on."""
+    held: MotionTable
     """Before that."""
     footfalls: tuple[Footfall, ...]
     judged: int
@@ -99,11 +99,11 @@ class Analysis(NamedTuple):
     judged_footfalls: tuple[Footfall, ...]
     """Those of that part."""
     status: SyncStatus
-    """Of a monitor that saw `motion`."""
+    """Status of a monitor that saw `motion`."""
     estimator: PhaseStatus
-    """Of an estimator that saw all, also what came before `motion`."""
+    """Status of an estimator that saw everything, also what came before `motion`."""
     cadence: CadenceStatus
-    """Of the joint states, from the first of `motion` on: what never came, or was not recorded."""
+    """Gaps in the joint states from the first of `motion` on: samples that never came, or were not recorded."""
     joint_states: int
     """Messages, from the first of `motion` on; those that were refused included."""
     unreadable: str
@@ -313,7 +313,7 @@ class _Trial:
         self._first_footfall = len(self._footfalls)
 
     def _cadence(self, stamp_ns: Integers) -> CadenceStatus:
-        """Of the estimator, since the wheels were let go."""
+        """The estimator's gaps since the wheels were let go."""
         now, before = self._estimator.status().cadence, self._before
         gaps, longest_ns = now.gaps - before.gaps, np.diff(stamp_ns).max(initial=0)
         return CadenceStatus(now.rate, gaps, now.lost - before.lost, float(longest_ns) * 1e-9 if gaps else 0.0)
@@ -329,9 +329,9 @@ class _Trial:
             self._unreadable = self._lone.missing
         self._estimator.note_unstamped(self._lone.unstamped)
         motion = (
-            Motion(*(np.concatenate(column) for column in zip(*self._parts, strict=True)))
+            MotionTable(*(np.concatenate(column) for column in zip(*self._parts, strict=True)))
             if self._parts
-            else (Motion(*(np.empty(0, kind) for kind in _KINDS)))
+            else (MotionTable(*(np.empty(0, kind) for kind in _KINDS)))
         )
         return Analysis(
             self._params,

@@ -34,7 +34,7 @@ class RecordedTrial(NamedTuple):
     about: dict[str, str]
     """Note, machine, version and so on; empty where nothing was recorded."""
     decay: Decay
-    """Of its error from step to step."""
+    """How the error decays from step to step."""
     rig: RigParams
     """k, b and slope are NaN where neither a simulator nor a rig file told them."""
 

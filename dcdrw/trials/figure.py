@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dcdrw.trials.analysis import Analysis, Floats, Motion
+from dcdrw.trials.analysis import Analysis, Floats, MotionTable
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_sim.figures.style import BAND, BLACK, COLUMN, WHEELS, for_print, new_figure, save
@@ -16,7 +16,7 @@ from dcdrw_sim.figures.style import BAND, BLACK, COLUMN, WHEELS, for_print, new_
 SCREEN = 10.0
 """Width on a screen [inch]."""
 LETTERS = 15
-"""Of a title's line, in an inch of letters of POINTS."""
+"""Letters of POINTS that an inch of a title's line holds."""
 _FORCE = '#555555'
 
 
@@ -71,7 +71,7 @@ class _Course(NamedTuple):
     """What of a trial is drawn: all of it, or where the stamps went back, the run that is judged."""
 
     trial: Analysis
-    motion: Motion
+    motion: MotionTable
     time: Floats
     """[s]"""
     pieces: list[tuple[float, float]]

@@ -42,7 +42,7 @@ FRAMES = (
     'omega2',
     *(f'{name}{wheel}' for wheel in (1, 2) for name in ('tags', 'error_px', 'x', 'y')),
 )
-"""Of frames.csv."""
+"""Columns of frames.csv."""
 
 
 class TrackingParams(NamedTuple):
@@ -55,7 +55,7 @@ class TrackingParams(NamedTuple):
 
 
 def add_film_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments that choose a `Film`."""
+    """Add the arguments that choose a `TrackedVideo`."""
     parser.add_argument('video', type=Path, metavar='VIDEO')
     parser.add_argument(
         '--camera',
@@ -91,7 +91,7 @@ def add_film_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--quiet', action='store_true', help='no live progress')
 
 
-class Film:
+class TrackedVideo:
     """A video, the camera that filmed it, and the tracker that is to follow the wheels in it.
 
     Raises:
@@ -221,7 +221,7 @@ def joint_batches(samples: Iterable[JointSample], names: PhaseParams) -> Iterato
 
 
 @contextmanager
-def debug_video(path: Path, film: Film, force: bool = False) -> Iterator[Callable[[Frame, Tracked], None]]:
+def debug_video(path: Path, film: TrackedVideo, force: bool = False) -> Iterator[Callable[[Frame, Tracked], None]]:
     """What writes a frame with what was made of it drawn in.
 
     Raises:
@@ -248,7 +248,7 @@ def _columns(view: WheelView | None) -> tuple[Any, ...]:
     return (view.tags, view.error_px, *view.hub) if view else (0, '', '', '')
 
 
-def quality(film: Film, frames: Sequence[Tracked]) -> dict[str, Any]:
+def quality(film: TrackedVideo, frames: Sequence[Tracked]) -> dict[str, Any]:
     """How well the wheels were tracked, for a program."""
     status = film.tracker.status()
     angles = status.angles

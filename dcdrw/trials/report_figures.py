@@ -12,7 +12,7 @@ from dcdrw_sim.figures.style import BAND, BLACK, BLUE, GREEN, ORANGE, PINK, SKY,
 
 _COLOURS = BLUE, VERMILION, GREEN, PINK, SKY, ORANGE, BLACK
 MOST_POINTS = 1500
-"""Of a curve: more than a page shows."""
+"""Points of a curve: more than a page shows."""
 
 
 def colour(number: int) -> str:

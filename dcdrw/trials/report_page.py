@@ -83,7 +83,7 @@ _PAGE = """<!doctype html>
 </html>
 """
 GAPS_LISTED = 12
-"""Of each trial, the longest."""
+"""Gaps that are listed of each trial, the longest first."""
 
 
 def page(title: str, trials: Sequence[RecordedTrial], tables: Mapping[str, str]) -> str:
@@ -130,7 +130,7 @@ _HEADS = (
     ('source', ''),
 )
 _CLASSES = {0: ' class="text name"', 1: ' class="text"'}
-"""Of the columns that are no figures."""
+"""Classes of the columns that hold text."""
 _UNKNOWN = '–'
 """A column that holds nothing else is left out."""
 

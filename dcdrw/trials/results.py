@@ -95,7 +95,7 @@ def _shown(batches: Iterator[JointBatch], total: int) -> Iterator[JointBatch]:
 
 
 def describe(agreements: dict[str, Agreement]) -> dict[str, dict[str, int]]:
-    """For a program."""
+    """The agreement of each topic, as numbers for a program."""
     return {topic: agreement._asdict() for topic, agreement in agreements.items()}
 
 

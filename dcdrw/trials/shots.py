@@ -61,16 +61,16 @@ class Files(NamedTuple):
         )
 
 
-class Filmed(NamedTuple):
+class FilmResult(NamedTuple):
     """What was filmed."""
 
     frames: int
-    """In the video."""
+    """Number of frames in the video."""
     trouble: str
     """Why the motion ended before the film; empty where it did not."""
 
 
-def film(
+def film_trial(
     params: FilmParams,
     files: Files,
     count: int,
@@ -80,7 +80,7 @@ def film(
     force: bool = False,
     stopped: Sequence[object] = (),
     report: Callable[[int], None] = lambda frame: None,
-) -> Filmed:
+) -> FilmResult:
     """Film a simulated trial; the files get their names once the whole film is there.
 
     Args:
@@ -133,7 +133,7 @@ def film(
                 stamps.writerow((joints.stamp_ns,))
     if not drop:
         files.stamps.unlink(missing_ok=True)  # of a film that this one overwrites
-    return Filmed(video.frames, trouble)
+    return FilmResult(video.frames, trouble)
 
 
 class Shots:

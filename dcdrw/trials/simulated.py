@@ -69,7 +69,7 @@ class Course(NamedTuple):
     interrupted: list[int]
     """The signals that ended it early."""
     analysis: Analysis
-    """Of what was recorded."""
+    """Analysis of the recording."""
     agreements: dict[str, Agreement]
     truth: TruthError | None
     """Where a camera filmed the rig."""
@@ -231,7 +231,7 @@ class SimulatedTrial:
             raise TrialError(recorder.message)
 
     def _stop_nodes(self) -> None:
-        """The recorder first: what the others publish when they end is no part of the trial."""
+        """The recorder first: what the others publish when they end is not part of the trial."""
         for group in (self._nodes[:1], self._nodes[1:]):
             for node in group:
                 node.interrupt()

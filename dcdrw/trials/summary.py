@@ -17,7 +17,7 @@ class Samples(NamedTuple):
     """What came of the messages of a trial."""
 
     joint_states: int
-    """From the moment on that the wheels were let go, those that were refused included."""
+    """Number of joint states since the wheels were let go, with those that were refused."""
     phase_state: int
     gaps: int
     lost: int
@@ -25,7 +25,7 @@ class Samples(NamedTuple):
     refused: dict[Refusal, int]
     """By the reason; of all that were recorded, as everything below."""
     restarts: tuple[Restart, ...]
-    """Of the source."""
+    """When the source started anew."""
     clock_steps: tuple[ClockStep, ...]
     """Times that the clock of the source was set, which are undone."""
     unstamped: int
@@ -52,7 +52,7 @@ class Summary(NamedTuple):
     """Where the part begins that is judged, from the moment on that the wheels were let go."""
     synchronized: bool | None
     initial_phase_percent: float | None
-    """Of a step, as every phase but the next but one."""
+    """Phase in percent of a step, as all phases here but `initial_phase_stride_percent`."""
     final_phase_percent: float | None
     final_phase_percent_of_stride: float | None
     steps_to_synchronization: int | None
@@ -73,7 +73,7 @@ class Summary(NamedTuple):
     damage: tuple[str, ...]
     """What of the recording was left out, for it is damaged."""
     parameters: dict[str, dict[str, Any]]
-    """Of each node; None where derived from others."""
+    """Parameters of each node; None where they are derived from others."""
 
 
 def summarize(trial: Analysis) -> Summary:

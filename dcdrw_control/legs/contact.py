@@ -17,7 +17,7 @@ MEMORY = 0.2
 
 
 class ContactDetector:
-    """From whether a foot touches the ground to lifts and strikes: every change is one, bounces too."""
+    """Turns contacts of a foot with the ground into lifts and strikes: every change is one, bounces too."""
 
     def __init__(self) -> None:
         self.reset()
@@ -35,7 +35,7 @@ class ContactDetector:
 
 
 class ForceDetector:
-    """From a foot's vertical force to lifts and strikes, whatever its sign, its offset and the person's weight."""
+    """Turns a foot's vertical force into lifts and strikes, whatever its sign, its offset and the person's weight."""
 
     def __init__(self) -> None:
         self._contact = ContactDetector()
@@ -68,7 +68,7 @@ class ForceDetector:
         if touches:
             self._offsets.learn(self._unloaded / self._count)
             self._unloaded, self._count = 0.0, 0
-        elif self._highest > 0.5 * self._peaks.usual(self._highest):  # else it was no stance
+        elif self._highest > 0.5 * self._peaks.usual(self._highest):  # else it was not a stance
             self._peaks.learn(self._highest)
             self._highest = load
         return self._contact.update(crossing_ns(last_ns, last, stamp_ns, load, level), touches)

@@ -37,7 +37,7 @@ class LegTable(NamedTuple):
     """What a file holds."""
 
     readings: list[LegReading]
-    """In the order of time."""
+    """The readings in the order of time."""
     rate: float
     """Samples per second [Hz]."""
     degrees: bool
@@ -58,7 +58,7 @@ def read_legs(path: Path, rate: float = math.nan) -> LegTable:
         rate: samples per second [Hz], in the place of the file's own times.
 
     Raises:
-        ValueError: there is no column that is known, a value is no number, or the time is unknown or does not grow.
+        ValueError: there is no column that is known, a value is not a number, or the time is unknown or does not grow.
         OSError: the file cannot be read.
 
     """

@@ -19,7 +19,7 @@ class Event(NamedTuple):
 
     kind: Literal['lift', 'strike']
     stamp_ns: int
-    """Of the event itself, interpolated between samples; it is known a few samples later."""
+    """Stamp of the event itself, interpolated between samples; it is known a few samples later."""
 
 
 def crossing_ns(before_ns: int, before: float, after_ns: int, after: float, level: float = 0.0) -> int:

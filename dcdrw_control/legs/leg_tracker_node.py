@@ -14,7 +14,7 @@ from dcdrw_control.legs.samples import Leg, LegReading, Reading
 from dcdrw_control.legs.tracker import LegTracker
 from dcdrw_msgs_py.diagnosis import Diagnosis
 from dcdrw_msgs_py.messages import stamp_ns, turns_message
-from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run
+from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, publish_diagnosis, run
 from dcdrw_msgs_py.topics import JOINT_STATES, LEG_JOINT_STATES, LEG_PHASES, LEG_SENSORS
 
 STALE_AFTER = 1.0
@@ -31,7 +31,7 @@ class LegTrackerNode(Node):
         self._phases = advertise(self, LEG_PHASES)
         self._joints = advertise(self, JOINT_STATES)
         self._age = Age()
-        report(self, self._diagnose)
+        publish_diagnosis(self, self._diagnose)
         for (half, side, kind), topic in LEG_SENSORS.items():
             listen(self, topic, partial(self._on_sensor, Leg(half, side), READERS[kind]))
         listen(self, LEG_JOINT_STATES, self._on_hips)

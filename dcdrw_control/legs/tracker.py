@@ -18,7 +18,7 @@ from dcdrw_msgs_py.samples import SECOND, Turn
 from dcdrw_msgs_py.topics import FRONT_WHEEL, REAR_WHEEL
 
 Refusal = Literal['unreadable', 'not finite', 'repeated', 'reversed', 'future', 'another sensor']
-"""Why a reading is refused: its message makes no sense, a value is no number, its stamp stands still, goes back or
+"""Why a reading is refused: its message makes no sense, a value is not a number, its stamp stands still, goes back or
 lies ahead of the clock, or another kind of sensor tells of the same leg."""
 RESTART = 1.0
 """Stamps that go back by more are those of a source that starts anew, as a recording that is played again [s]."""
@@ -53,7 +53,7 @@ class LegStatus(NamedTuple):
     known: bool
     """Whether its phase is known."""
     strikes: int
-    """With the missed ones."""
+    """Number of heel strikes, with the missed ones."""
     missed: int
     """Strikes that were overdue and counted without having been seen."""
     doubled: int
@@ -73,7 +73,7 @@ class LegTrackerStatus(NamedTuple):
     """A snapshot of the tracker, for diagnostics."""
 
     stamp_ns: int
-    """Of the newest reading; 0 before the first."""
+    """Stamp of the newest reading; 0 before the first."""
     legs: dict[Leg, LegStatus]
     refused: dict[Refusal, int]
 

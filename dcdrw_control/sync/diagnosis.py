@@ -6,7 +6,7 @@ from dcdrw_msgs_py.diagnosis import AGE, STATE, Diagnosis, Level
 
 _MEANINGS: dict[Fault, str] = {
     'stale': 'phase_state has stopped',
-    'not finite': 'phase_state carried a value that is no number, or lacked a wheel',
+    'not finite': 'phase_state carried a value that is not a number, or lacked a wheel',
     'new run': 'the source of phase_state started anew',
     'stalled': 'a wheel does not strike any more',
     'slipped': 'a wheel slipped a step',

@@ -35,7 +35,7 @@ class HoldGains(NamedTuple):
 
 
 class HoldLaw:
-    """From phase samples to a force; only strikes of the front wheel change it."""
+    """Turns phase samples into a force, which only strikes of the front wheel change."""
 
     _last: PhaseSample | None
     force: float

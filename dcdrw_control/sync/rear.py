@@ -53,7 +53,7 @@ class HubGains(NamedTuple):
 
 
 class RearLaw:
-    """From phase samples to a torque on the rear hub."""
+    """Turns phase samples into a torque on the rear hub."""
 
     _last: PhaseSample | None
     _pace: float
@@ -87,7 +87,7 @@ class RearLaw:
             self._pace = sample.front.rate
             return
         elapsed = (sample.stamp_ns - last.stamp_ns) / SECOND
-        share = -math.expm1(-elapsed / (0.25 * self._period))  # a strike's jolt is no change of pace
+        share = -math.expm1(-elapsed / (0.25 * self._period))  # a strike's jolt is not a change of pace
         self._pace += share * (sample.front.rate - self._pace)
 
     def act(self, now: float, torque: float) -> None:

@@ -15,11 +15,11 @@ from typing import Annotated, Literal, NamedTuple
 from dcdrw_msgs_py.quantity import Quantity
 
 RAMP_SECONDS = 0.05
-"""From the largest force to none [s]: with the period of the commands, well within 100 ms."""
+"""Time of the ramp from the largest force to none [s]: with the period of the commands, well within 100 ms."""
 
 Fault = Literal['stale', 'not finite', 'new run', 'stalled', 'slipped', 'second publisher', 'clock']
-"""Why a synchronizer stops: no sample for too long, a value that is no number, a source that started anew, a wheel that
-does not strike any more, |n| beyond 1, somebody else who commands as well, or a clock that went back."""
+"""Why a synchronizer stops: no sample for too long, a value that is not a number, a source that started anew, a wheel
+that does not strike any more, |n| beyond 1, somebody else who commands as well, or a clock that went back."""
 
 
 class State(Enum):
@@ -109,7 +109,7 @@ class Safety:
 
         Args:
             now: of a steady clock [s]; where it goes back, nothing is allowed to change.
-            wanted: by the law [N]; what is no number counts as none.
+            wanted: by the law [N]; what is not a number counts as none.
             rate: Ḋ of the coupler [m/s]; NaN where it is unknown, and power then is not limited.
 
         """

@@ -60,12 +60,12 @@ class Command(NamedTuple):
     """What is commanded at one instant."""
 
     force: float
-    """Of the coupler [N], tension positive."""
+    """Force of the coupler [N], tension positive."""
     torque: float
-    """On the rear hub [N·m], positive where it rolls it downhill."""
+    """Torque on the rear hub [N·m], positive where it rolls it downhill."""
     state: State
     stamp_ns: int
-    """Of the sample that it came from; 0 where there was none."""
+    """Stamp of the sample that the command came from; 0 where there was none."""
 
 
 class Synchronizer:
@@ -103,7 +103,7 @@ class Synchronizer:
         self._heartbeat = now if on else -math.inf
 
     def refuse(self) -> None:
-        """A message was no sample: a wheel is missing, or a value is no number."""
+        """A message was not a sample: a wheel is missing, or a value is not a number."""
         self.refused += 1
         self.safety.trip('not finite')
 

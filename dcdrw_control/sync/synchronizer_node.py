@@ -15,7 +15,7 @@ from dcdrw_control.sync.safety import State
 from dcdrw_control.sync.synchronizer import Command, Synchronizer, SynchronizerParams
 from dcdrw_msgs_py.diagnosis import Diagnosis
 from dcdrw_msgs_py.messages import PhaseSampleReader, to_stamp
-from dcdrw_msgs_py.node import Parameters, advertise, listen, report, run, steady_clock
+from dcdrw_msgs_py.node import Parameters, advertise, listen, publish_diagnosis, run, steady_clock
 from dcdrw_msgs_py.topics import (
     COUPLER_FORCE_COMMAND,
     COUPLER_WRENCH,
@@ -47,7 +47,7 @@ class SynchronizerNode(Node):
         self.create_service(Trigger, '~/reset_fault', self._on_reset_fault)
         listen(self, ENABLE, lambda message: self._core.enable(time.monotonic(), message.data))
         listen(self, PHASE_STATE, self._on_phase)
-        report(self, self._diagnose)
+        publish_diagnosis(self, self._diagnose)
         self.create_timer(1.0 / settings.value.rate, self._tick, clock=steady_clock())
         self.create_timer(WATCH_SECONDS, self._watch, clock=steady_clock())
         self._tick()

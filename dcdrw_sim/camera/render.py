@@ -23,8 +23,8 @@ from dcdrw_sim.camera.scene import (
     ViewParams,
     WheelPlace,
     camera_pose,
+    rotations_after,
     speed,
-    turned,
 )
 
 Colour = tuple[int, int, int]
@@ -184,28 +184,28 @@ class Renderer:
             time: since the first frame [s], for the occluder.
 
         """
-        pose = self.pose(footing.places(*turned(joints, 0.0)))
+        pose = self.pose(footing.places(*rotations_after(joints, 0.0)))
         frame: Picture = self._background.copy()
         if self._follow:
             self._draw_marks(frame, pose)
         exposures = self._exposures(joints)
         if exposures == 1:
-            self._draw_rig(frame, footing.places(*turned(joints, 0.0)))
+            self._draw_rig(frame, footing.places(*rotations_after(joints, 0.0)))
         else:
             sums, still = np.zeros(frame.shape, np.uint16), frame.copy()
             for part in (np.arange(exposures) + 0.5) / exposures - 0.5:
                 np.copyto(frame, still)
-                self._draw_rig(frame, footing.places(*turned(joints, part * self._look.exposure)))
+                self._draw_rig(frame, footing.places(*rotations_after(joints, part * self._look.exposure)))
                 np.add(sums, frame, out=sums)
             self._cv2.convertScaleAbs(sums, frame, 1.0 / exposures)
         hidden = self._look.hidden(time)
         if hidden:
-            self._draw_person(frame, footing.places(*turned(joints, 0.0)), hidden)
+            self._draw_person(frame, footing.places(*rotations_after(joints, 0.0)), hidden)
         return self._develop(frame)
 
     def tag_pixels(self, footing: Footing, joints: JointSample) -> dict[int, Floats]:
         """Where the corners of each tag's black square are in the picture, as `corners` orders them, (4, 2) [px]."""
-        places = footing.places(*turned(joints, 0.0))
+        places = footing.places(*rotations_after(joints, 0.0))
         pose = self.pose(places)
         return {
             tag.mount.id: self._camera.project(pose.optical(places[tag.wheel].points(corners(tag.mount), tag.plane)))

@@ -22,9 +22,9 @@ from dcdrw_msgs_py.tagging import SPACING, Mount, TagParams, mounts
 Floats = NDArray[np.float64]
 
 LONGEST = 100.0
-"""A coupler longer than this is no measurement [ℓ]."""
+"""A coupler longer than this is not a measurement [ℓ]."""
 FASTEST = 1e3
-"""A speed above this is no measurement [rad/s]."""
+"""A speed above this is not a measurement [rad/s]."""
 
 
 class SceneParams(NamedTuple):
@@ -179,9 +179,9 @@ class WheelPlace(NamedTuple):
     """Where one wheel is, in its own plane."""
 
     along: float
-    """Of the hub [m]."""
+    """Place of the hub along the slope [m]."""
     above: float
-    """Of the hub [m]."""
+    """Height of the hub above the slope [m]."""
     psi: float
     """[rad]"""
 
@@ -223,7 +223,7 @@ class CameraPose(NamedTuple):
     """Where the camera stands, and how it looks."""
 
     rotation: Floats
-    """From the slope's frame to the optical frame (x right, y down, z forward), (3, 3)."""
+    """Rotation from the slope's frame to the optical frame (x right, y down, z forward), (3, 3)."""
     position: Floats
     """(3,) [m]"""
 
@@ -259,7 +259,7 @@ def camera_pose(scene: SceneParams, view: ViewParams) -> CameraPose:
     return CameraPose(axes @ slope_axes.T, slope_axes @ (view.distance * outward + view.height * up))
 
 
-def turned(joints: JointSample, seconds: float) -> tuple[float, float]:
+def rotations_after(joints: JointSample, seconds: float) -> tuple[float, float]:
     """Both rotations a short time later or earlier, by the speeds of the sample [rad]."""
     return joints.front.angle + seconds * speed(joints.front), joints.rear.angle + seconds * speed(joints.rear)
 

@@ -9,7 +9,7 @@ from dcdrw_msgs_py.diagnosis import Diagnosis, Level
 from dcdrw_msgs_py.frame import Frame
 from dcdrw_msgs_py.image_messages import camera_message, image_message
 from dcdrw_msgs_py.messages import JointSampleReader
-from dcdrw_msgs_py.node import Age, Parameters, advertise, follow_runs, listen, report, run, steady_clock
+from dcdrw_msgs_py.node import Age, Parameters, advertise, follow_runs, listen, publish_diagnosis, run, steady_clock
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.tagging import TagParams
 from dcdrw_msgs_py.topics import CAMERA_INFO, IMAGE_RAW, JOINT_STATES
@@ -17,14 +17,14 @@ from dcdrw_sim.camera.render import LookParams, Renderer
 from dcdrw_sim.camera.scene import Footing, SceneParams, ViewParams
 from dcdrw_sim.camera.shutter import Shutter, ShutterParams
 
-LOOKS_PER_FRAME = 4
+CHECKS_PER_FRAME = 4
 """How often to look for a frame that is due, so that it is drawn soon after."""
 STALE_AFTER = 1.0
 """Without joint states for this long there is nothing to draw [s]."""
 MANY_DROPPED = 0.05
-"""More dropped frames than this part of the drawn ones are worth a warning."""
+"""More dropped frames than this fraction of the drawn ones are worth a warning."""
 LARGEST_ROTATION = 1e9
-"""Beyond this, and where it is no number, a rotation is no measurement [rad]."""
+"""Beyond this, and where it is not a number, a rotation is not a measurement [rad]."""
 
 
 class VirtualCameraNode(Node):
@@ -51,10 +51,10 @@ class VirtualCameraNode(Node):
         self._reader = JointSampleReader()
         self._images = advertise(self, IMAGE_RAW)
         self._infos = advertise(self, CAMERA_INFO)
-        report(self, self._diagnose)
+        publish_diagnosis(self, self._diagnose)
         follow_runs(self, self._reader.runs)
         listen(self, JOINT_STATES, self._on_joints)
-        self.create_timer(1.0 / (LOOKS_PER_FRAME * params.frame_rate), self._take_frame, clock=steady_clock())
+        self.create_timer(1.0 / (CHECKS_PER_FRAME * params.frame_rate), self._take_frame, clock=steady_clock())
         self.get_logger().info(
             f'waiting for joint_states, to draw {self._camera.width}x{self._camera.height} '
             f'{params.encoding} at {params.frame_rate:g} Hz'

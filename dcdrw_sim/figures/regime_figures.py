@@ -27,7 +27,7 @@ REGIMES = (
 )
 """Name, colour, and the verdicts that make them; lightness tells them apart, too."""
 CURVE_POINTS = 41
-"""Of a boundary."""
+"""Points of a boundary."""
 
 
 def draw_coupler_regimes(axes: Any, dataset: Any, shorter: float | None = None) -> None:

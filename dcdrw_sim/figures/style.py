@@ -12,12 +12,12 @@ BLUE, ORANGE, VERMILION, GREEN, BLACK = '#0072B2', '#E69F00', '#D55E00', '#009E7
 SKY, PINK = '#56B4E9', '#CC79A7'
 WHEELS = {FRONT: BLUE, REAR: VERMILION}
 BAND = GREEN
-"""Of what is in step."""
+"""Colour of what is in step."""
 FORMATS = 'png', 'pdf', 'svg'
 COLUMN, PAGE = 3.5, 7.2
 """Width of a journal's column and of its page [inch]."""
 POINTS = 8
-"""Of letters in print."""
+"""Size of letters in print [pt]."""
 _PRINT = {
     **{f'{what}.labelsize': POINTS for what in ('axes', 'xtick', 'ytick')},
     **{f'{what}.titlesize': POINTS for what in ('axes', 'figure')},

@@ -29,7 +29,7 @@ EIGENVALUES = {
 STARTS = (BLUE, VERMILION, GREEN, ORANGE, SKY, PINK, BLACK, '#999999', '#882255')
 """Colours of the starts: Okabe and Ito's, and one more."""
 SAMPLES = 4000
-"""Of a motion that is drawn."""
+"""Samples of a motion that is drawn."""
 
 
 class Best(NamedTuple):

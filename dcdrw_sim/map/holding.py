@@ -32,8 +32,8 @@ METHODS: tuple[Method, ...] = get_args(Method)
 
 MOST_GAIN = 20.0
 """Where the search for an unstable gain ends, in gains of the law."""
-LOOKS = 40
-"""Gains and delays that are looked at on the way; between two of them the edge is found exactly."""
+EDGE_SAMPLES = 40
+"""Gains or delays that are tried along the way; between two of them the edge is found exactly."""
 WHOLE_STEP = 0.999
 """Delays are looked at up to this fraction of a step's time; a longer one would be that of another step."""
 
@@ -68,9 +68,9 @@ class Law(NamedTuple):
     force: float
     """[N]"""
     gain: Floats
-    """By θ1′ [N·s/rad], θ2 [N/rad] and θ2′ [N·s/rad], shape (3,)."""
+    """Gains on θ1′ [N·s/rad], θ2 [N/rad] and θ2′ [N·s/rad], shape (3,)."""
     gain_before: float
-    """By the force that was held before."""
+    """Gain on the force that was held before."""
 
 
 class Margins(NamedTuple):
@@ -146,7 +146,7 @@ def margins(plant: Plant, chosen: Law) -> Margins:
 
 
 def _first_unstable(radius: Callable[[float], float], low: float, high: float) -> float:
-    grid = np.linspace(low, high, LOOKS)
+    grid = np.linspace(low, high, EDGE_SAMPLES)
     values = [radius(value) for value in grid]
     for i in range(1, len(grid)):
         if values[i - 1] < 0.0 <= values[i]:

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from dcdrw_msgs_py.values import each
 from dcdrw_sim.map.return_map import (
+    NEWTON_TOLERANCE,
     PROGRESS,
     SINGULAR,
-    TOLERANCE,
     Complexes,
     FixedPoint,
     ReturnMap,
@@ -49,7 +49,7 @@ class LimitCycles(NamedTuple):
     states: Floats
     """[θ1′, θ2, θ2′] at the section, shape (N, 3)."""
     derivatives: Floats
-    """Of the map, shape (N, 3, 3)."""
+    """Derivatives of the map, shape (N, 3, 3)."""
     periods: Floats
     """A step's time [s], shape (N,)."""
     omega2: Floats
@@ -129,7 +129,7 @@ def find_limit_cycles(rigs: Rigs, starts: Floats) -> LimitCycles:
         change = there.states - here[sought]
         left = _size(change / scales[sought])
         known = np.isfinite(left) & np.isfinite(derivatives).all(axis=(1, 2))
-        done = (left < TOLERANCE) & known
+        done = (left < NEWTON_TOLERANCE) & known
         at = sought[done]
         found.states[at], found.derivatives[at] = here[at], derivatives[done]
         found.periods[at], found.omega2[at] = there.periods[done], there.omega2[done]
@@ -141,7 +141,7 @@ def find_limit_cycles(rigs: Rigs, starts: Floats) -> LimitCycles:
         # As `ReturnMap`: Newton's step where it is progress, else the map's own.
         candidates = here[sought] + _least_squares(np.eye(3) - derivatives[alive], change)
         after = step_maps(rigs, candidates, sought).states
-        progress = _size((after - candidates) / scales[sought]) < np.maximum(PROGRESS * left, TOLERANCE)
+        progress = _size((after - candidates) / scales[sought]) < np.maximum(PROGRESS * left, NEWTON_TOLERANCE)
         here[sought] = np.where(progress[:, None], candidates, there.states[alive])
     return found
 

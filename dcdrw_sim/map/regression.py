@@ -17,11 +17,11 @@ from dcdrw_sim.map.limit_cycles import search_fixed_point
 from dcdrw_sim.map.return_map import Complexes, FixedPoint, Floats, NoReturnError, ReturnMap, spectrum
 
 RANK_TOLERANCE = 1e-10
-"""Directions of the data below this part of the largest count as absent, and A is 0 along them."""
-PHASES = tuple(j / 10 for j in range(1, 10))
+"""Directions of the data below this fraction of the largest count as absent, and A is 0 along them."""
+TRIAL_PHASES = tuple(j / 10 for j in range(1, 10))
 """Where the nine trials start, in steps."""
 STEPS = 100
-"""Of each trial; the paper's 200 √(ℓ/g) are about as many."""
+"""Steps of each trial; the paper's 200 √(ℓ/g) are about as many."""
 BAND = math.radians(1.0)
 """Within this of its fixed point, θ2 has converged [rad]."""
 
@@ -36,11 +36,11 @@ class Regression(NamedTuple):
     rank: int
     """Directions that the data hold; where fewer than n, A is the smallest of those that fit."""
     singular_values: Floats
-    """Of the data, largest first: the roots of the eigenvalues of P⁻¹."""
+    """Singular values of the data, largest first: the roots of the eigenvalues of P⁻¹."""
 
     @property
     def eigenvalues(self) -> Complexes:
-        """Of A, those of largest modulus first."""
+        """Eigenvalues of A, those of largest modulus first."""
         return spectrum(self.matrix)
 
     @property
@@ -50,15 +50,15 @@ class Regression(NamedTuple):
         return float((self.singular_values[0] / least) ** 2) if least else math.inf
 
 
-class Trial(NamedTuple):
+class MapTrial(NamedTuple):
     """A motion from the uncoupled limit cycles at a phase."""
 
     phase: float
-    """At the start, in steps."""
+    """Phase at the start, in steps."""
     states: Floats
-    """At each section, rows [θ1′, θ2, θ2′], shape (steps + 1, 3); empty where the motion did not go on so long."""
+    """States at each section, rows [θ1′, θ2, θ2′], shape (steps + 1, 3); empty where the motion ended before."""
     steps_to_cycle: int | None
-    """Until θ2 at the section stays within BAND of the fixed point; None if it never does."""
+    """Steps until θ2 at the section stays within BAND of the fixed point; None if it never does."""
     trouble: str
     """Why the motion did not go on, else empty."""
 
@@ -67,12 +67,12 @@ class Convergence(NamedTuple):
     """How fast a pair falls into step, by every measure."""
 
     fixed_point: FixedPoint
-    """With the multipliers of the exact derivative."""
+    """The fixed point, with the multipliers of the exact derivative."""
     raw: Regression | None
     """The paper's, on the trials' four states; None where no trial went through all its steps."""
     affine: Regression | None
-    """With an offset, on the three that are independent; None as `raw`."""
-    trials: tuple[Trial, ...]
+    """The regression with an offset, on the three states that are independent; None as `raw`."""
+    trials: tuple[MapTrial, ...]
 
 
 def fit_raw(trajectories: Iterable[ArrayLike], tolerance: float = RANK_TOLERANCE) -> Regression:
@@ -136,7 +136,10 @@ def steps_to_stay(values: ArrayLike, target: float, band: float = BAND) -> int |
 
 
 def measure(
-    return_map: ReturnMap, phases: Sequence[float] = PHASES, steps: int = STEPS, fixed_point: FixedPoint | None = None
+    return_map: ReturnMap,
+    phases: Sequence[float] = TRIAL_PHASES,
+    steps: int = STEPS,
+    fixed_point: FixedPoint | None = None,
 ) -> Convergence:
     """Measure convergence by every means: derivative, regressions, and counting.
 
@@ -160,10 +163,10 @@ def measure(
     return Convergence(fixed_point, fit_raw(map(return_map.raw, whole)), fit_affine(whole), trials)
 
 
-def _try(return_map: ReturnMap, phase: float, steps: int, target: float) -> Trial:
+def _try(return_map: ReturnMap, phase: float, steps: int, target: float) -> MapTrial:
     start = return_map.at_phase(phase)
     try:
         states = return_map.iterate(start, steps)
     except NoReturnError as error:
-        return Trial(phase, np.empty((0, 3)), None, str(error))
-    return Trial(phase, states, steps_to_stay(states[:, 1], target), '')
+        return MapTrial(phase, np.empty((0, 3)), None, str(error))
+    return MapTrial(phase, states, steps_to_stay(states[:, 1], target), '')

@@ -20,12 +20,12 @@ from dcdrw_sim.motion.trajectory import WHEELS, Run, run
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-TOLERANCE = 1e-12
+NEWTON_TOLERANCE = 1e-12
 """Change over a step, in rad and √(g/ℓ), below which a point counts as fixed."""
 MAX_ITERATIONS = 200
 """Limit of the search for a fixed point."""
 PROGRESS = 0.5
-"""Newton's step is taken where it cuts the change over a step to this part of what it was."""
+"""Newton's step is taken where it cuts the change over a step to this fraction of what it was."""
 SINGULAR = 1e-10
 """Smallest singular value, of the largest, along which Newton's step is taken."""
 NEUTRAL = 1e-9
@@ -53,9 +53,9 @@ class Return(NamedTuple):
     state: SectionState
     """After the step."""
     derivative: Floats
-    """Of that state by the one before, shape (3, 3)."""
+    """Derivative of that state by the one before, shape (3, 3)."""
     by_force: Floats
-    """Of that state by a constant external force, shape (3,) [per N]."""
+    """Derivative of that state by a constant external force, shape (3,) [per N]."""
     period: float
     """How long the step took [s]."""
 
@@ -65,7 +65,7 @@ class FixedPoint(NamedTuple):
 
     state: SectionState
     derivative: Floats
-    """Of the map, shape (3, 3)."""
+    """Derivative of the map, shape (3, 3)."""
     by_force: Floats
     """How the state at the next section changes with a constant external force, shape (3,) [per N]."""
     period: float
@@ -167,7 +167,7 @@ class ReturnMap:
     def _search(self, here: SectionState, limit: int) -> FixedPoint:
         there = self.linearize(here)
         for iteration in range(limit):
-            if self._distance(here, there.state) < TOLERANCE:
+            if self._distance(here, there.state) < NEWTON_TOLERANCE:
                 return FixedPoint(here, there.derivative, there.by_force, there.period, iteration)
             here, there = self._newton(here, there) or (there.state, self.linearize(there.state))
         raise ValueError(
@@ -239,7 +239,7 @@ def _section_of(result: Run) -> SectionState:
 
 
 def _trouble(result: Run) -> str:
-    """Why a run is no step of the map; empty where it is."""
+    """Why a run is not a step of the map; empty where it is."""
     for strike in result.strikes:
         if strike.direction != FORWARD:
             return f'the {WHEELS[strike.wheel - 1]} wheel did not pass its apex and rocked back'

@@ -74,7 +74,7 @@ def _parse(entry: Json, where: str) -> Case:
     for keys, allowed in ((raw, known if raw is not entry else (*known, *_BESIDE)), (entry, (*known, *_BESIDE))):
         for key in keys:
             if key not in allowed:
-                raise ValueError(f'{where}: {key} is no key of a case{suggestion(key, allowed)}')
+                raise ValueError(f'{where}: {key} is not a key of a case{suggestion(key, allowed)}')
     name = str(raw.get('name', 'case'))
     where = f'{where} ({name})' if 'name' in raw else where
     g, slope, k, b, D0, S0 = (_numbers(raw, key, where)[0] for key in _NUMBERS)

@@ -52,7 +52,7 @@ from dcdrw_sim.motion.taylor import (
     work_parameters,
 )
 
-TOLERANCE = 5e-16
+ENSEMBLE_TOLERANCE = 5e-16
 """Last term of the angles' series at the end of a step [rad]: strikes within 1e-9 over 100 time units."""
 
 STRIKE = np.dtype(
@@ -112,7 +112,7 @@ TIME_OVER, STRIKES, STANDING, FALLEN, STALLED, HUBS_MET = (int(end) for end in E
     SIZE,
 ) = range(taylor.END, taylor.END + 34 * LANES, LANES)
 NEWTON_ITERATIONS = 2
-"""From the error of the inverse cubic down to rounding, mostly."""
+"""Iterations that take the error of the inverse cubic down to rounding, mostly."""
 CONVERGED = 1e-7
 """Last correction of Newton's method that leaves rounding error after it."""
 
@@ -137,7 +137,7 @@ def run_ensemble(
     states: ArrayLike,
     seconds: float,
     capacity: int,
-    tolerance: float = TOLERANCE,
+    tolerance: float = ENSEMBLE_TOLERANCE,
     strict: bool = True,
     **columns: ArrayLike,
 ) -> Ensemble:
@@ -161,7 +161,12 @@ def run_ensemble(
 
 
 def run_pairs(
-    rigs: Rigs, states: ArrayLike, seconds: float, capacity: int, tolerance: float = TOLERANCE, strict: bool = True
+    rigs: Rigs,
+    states: ArrayLike,
+    seconds: float,
+    capacity: int,
+    tolerance: float = ENSEMBLE_TOLERANCE,
+    strict: bool = True,
 ) -> Ensemble:
     """Run many pairs, each of its own rig.
 
@@ -216,7 +221,7 @@ def spread(rig: RigParams, count: int, columns: Mapping[str, ArrayLike]) -> Rigs
     common = {field.name: lookup(rig, field.name) for field in FIELDS}
     values: dict[str, Floats] = {}
     if unknown := set(columns) - set(common):
-        raise ValueError(f'{", ".join(sorted(unknown))} is no parameter of a rig; known are {", ".join(common)}')
+        raise ValueError(f'{", ".join(sorted(unknown))} is not a parameter of a rig; known are {", ".join(common)}')
     for name, shared in common.items():
         value = np.asarray(columns.get(name, shared), float)
         if value.shape not in ((), (count,)):

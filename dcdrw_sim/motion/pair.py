@@ -42,7 +42,7 @@ from dcdrw_sim.motion.ends import (
 from dcdrw_sim.motion.events import crossing, first_strike
 from dcdrw_sim.motion.taylor import LANES, ORDER
 
-TOLERANCE = 1e-16
+PAIR_TOLERANCE = 1e-16
 """Last term of the angles' series at the end of a step [rad]."""
 
 _THETA = (taylor.THETA1, taylor.THETA2)
@@ -290,7 +290,7 @@ class Simulation:
         w = self._work
         friction = taylor.rubs(self._rig)
         taylor.expand(w, 1, friction, True if self._torques != NO_TORQUES else None)
-        h = min(taylor.step_size(w, 0, TOLERANCE), LONGEST_STEP * self._unit)
+        h = min(taylor.step_size(w, 0, PAIR_TOLERANCE), LONGEST_STEP * self._unit)
         h = self._turn_once(taylor.friction_step(w, 0, h) if friction else h)
         self._require_progress(h >= SHORTEST_STEP * self._unit)
         wheel, direction = 0, NONE

@@ -67,9 +67,9 @@ class EvenGait(NamedTuple):
     """A gait of evenly spaced strikes, at the section: θ1 = α."""
 
     slope: float
-    """On which it goes [rad]."""
+    """The slope on which it goes [rad]."""
     period: float
-    """Of a step, in √(ℓ/g)."""
+    """Duration of a step, in √(ℓ/g)."""
     omega1: float
     """θ1′ in √(g/ℓ)."""
     theta2: float
@@ -77,7 +77,7 @@ class EvenGait(NamedTuple):
     omega2: float
     """θ2′"""
     multipliers: Complexes
-    """Of a whole step, the largest first, shape (3,)."""
+    """Multipliers of a whole step, the largest first, shape (3,)."""
 
 
 def even_gait(alpha: float, k: float, b: float, period: float, kept: float | None = None) -> EvenGait:

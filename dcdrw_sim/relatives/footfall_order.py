@@ -15,7 +15,7 @@ from dcdrw_sim.motion.ends import Strike
 FEET = {1: 'front left', 2: 'front right', 3: 'rear left', 4: 'rear right'}
 _FRONT, _REAR = (1, 2), (4, 3)
 TOGETHER = 1e-6
-"""Feet that fall closer together than this part of a stride fall as one."""
+"""Feet that fall closer together than this fraction of a stride fall as one."""
 
 
 class Contact(NamedTuple):

@@ -28,7 +28,7 @@ from dcdrw_sim.model.wheel import kinetic_energy
 
 STEEPEST = math.pi / 4
 """Steepest slope of a rig [rad]."""
-PHASES = 41
+PHASE_COUNT = 41
 """Phases among which the fastest is sought first."""
 NEAR_TOGETHER = 1e-6
 """Phase that stands for the limit p → 0, where the wheels strike one right after the other."""
@@ -49,7 +49,7 @@ class Impact(NamedTuple):
 
 
 class Stance(NamedTuple):
-    """From one strike to the next."""
+    """The motion from one strike to the next."""
 
     S: float
     """Distance of the feet [m]."""
@@ -165,7 +165,7 @@ class RigidPair:
     # Energy and strikes
 
     def kinetic_energy(self, state: State) -> float:
-        """Of both wheels [J]."""
+        """Kinetic energy of both wheels [J]."""
         return float(kinetic_energy(self.rig.front, state.omega1) + kinetic_energy(self.rig.rear, state.omega2))
 
     def potential_energy(self, theta1: float, theta2: float, S: float) -> float:
@@ -200,7 +200,7 @@ class RigidPair:
         return Impact(after, share**2, *impulses.tolist())
 
     def _velocities(self, state: State) -> NDArray[np.float64]:
-        """Of the front and the rear hub, along the slope and along its normal [m/s]."""
+        """Velocities of the front and the rear hub, along the slope and along its normal [m/s]."""
         v1, v2 = self.rig.front.length * state.omega1, self.rig.rear.length * state.omega2
         return np.array(
             [
@@ -304,7 +304,7 @@ def energy_per_metre(rig: RigParams) -> float:
     return (rig.front.mass + rig.rear.mass) * rig.gravity * math.sin(rig.slope)
 
 
-def gentlest_slope(rig: RigParams, phase: float) -> float:
+def gentlest_slope_at_phase(rig: RigParams, phase: float) -> float:
     """The slope [rad] above which the rigid pair has a steady gait at this phase."""
 
     def margin(slope: float) -> float:
@@ -326,15 +326,15 @@ def fastest_phase(rig: RigParams) -> float:
     def slowness(phase: float) -> float:
         return -_velocity(rig, phase)
 
-    phases = np.linspace(NEAR_TOGETHER, 1.0 - NEAR_TOGETHER, PHASES)
+    phases = np.linspace(NEAR_TOGETHER, 1.0 - NEAR_TOGETHER, PHASE_COUNT)
     speeds = [_velocity(rig, phase) for phase in phases]
     best = int(np.argmax(speeds))
     if not speeds[best] > 0.0:
         raise ValueError(
             f'slope {math.degrees(rig.slope):.4g}° is too gentle for the rigid pair; make it steeper than '
-            f'{math.degrees(gentlest_slope(rig, 0.5)):.4g}°, which 50 % needs'
+            f'{math.degrees(gentlest_slope_at_phase(rig, 0.5)):.4g}°, which 50 % needs'
         )
-    around = (phases[max(best - 1, 0)], phases[min(best + 1, PHASES - 1)])
+    around = (phases[max(best - 1, 0)], phases[min(best + 1, PHASE_COUNT - 1)])
     return float(minimize_scalar(slowness, bounds=around, method='bounded', options={'xatol': 1e-7}).x)
 
 
@@ -355,6 +355,6 @@ def slope_for_velocity(rig: RigParams, phase: float, velocity: float) -> float:
 
 
 def _velocity(rig: RigParams, phase: float) -> float:
-    """Of the steady gait [m/s]; 0 where there is none."""
+    """Mean velocity of the steady gait [m/s]; 0 where there is none."""
     velocity = RigidPair(rig, phase).gait().velocity
     return 0.0 if math.isnan(velocity) else velocity

@@ -14,7 +14,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from dcdrw_msgs_py.diagnosis import STATE, STEP_DIFFERENCE, Diagnosis, Level, SourceState
 from dcdrw_msgs_py.messages import JointSampleWriter, run_message, to_stamp
-from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
+from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, publish_diagnosis, run, steady_clock
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.topics import (
@@ -75,7 +75,7 @@ class SimulatorNode(Node):
             listen(self, topic, partial(self._on_command, topic))
         self.create_service(Trigger, '~/reset', self._on_reset)
         self.create_service(SetBool, '~/pause', self._on_pause)
-        self._report = report(self, self._diagnose)
+        self._report = publish_diagnosis(self, self._diagnose)
         self._timer = self.create_timer(self._period(), self._tick, clock=steady_clock())
         self._restart()
         doing = 'holding the wheels' if self._paused else 'rolling'

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dcdrw_msgs_py.in_step import BAND_PERCENT
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.map.limit_cycles import losses
-from dcdrw_sim.map.regression import PHASES
+from dcdrw_sim.map.regression import TRIAL_PHASES
 from dcdrw_sim.model.rigs import Rigs, take
 from dcdrw_sim.model.start import require_rolling
 from dcdrw_sim.model.wheel import gentlest_slope
@@ -27,10 +27,10 @@ from dcdrw_sim.study.verdict import Verdict
 
 Floats = NDArray[np.float64]
 
-TOLERANCE = 0.3
-"""What one buys may differ from what it says by this part."""
-EASE = 0.1
-"""The slope may be gentler than it was thought to be by this part."""
+PART_TOLERANCE = 0.3
+"""Fraction by which a bought part may differ from its data sheet."""
+SLOPE_TOLERANCE = 0.1
+"""Fraction by which the slope may be gentler than thought."""
 BLOCK = 64
 """Rigs of a piece of work: a fraction of a second."""
 GRID = 41
@@ -45,11 +45,11 @@ WORK = 2 * GRID**2 + ZOOMS * ZOOM**2 * (1 + CASES)
 WIDEST = 8.0
 """Margins are looked for up to this factor."""
 MARGIN_STEPS = 12
-"""Factors tried each way, at every look."""
+"""Factors tried each way in every round."""
 PATIENCE = 4.0
 """So many times as long as a trial may last motions are followed to find margins."""
-LOOKS = 3
-"""Each narrows down the gap that the last one found: an edge is known to about 0.1 %."""
+MARGIN_ROUNDS = 3
+"""Rounds that narrow down an edge: each divides the gap that the last one left; an edge is known to about 0.1 %."""
 VARIED = ('k', 'b', 'mass', 'slope')
 """What a rig may be other than it was thought to be."""
 
@@ -63,7 +63,7 @@ class Task(NamedTuple):
     """How long a trial may last."""
     band_percent: float = BAND_PERCENT
     """In step is within ± this [% of a step]."""
-    phases: tuple[float, ...] = PHASES
+    phases: tuple[float, ...] = TRIAL_PHASES
     """Starts, in steps."""
 
 
@@ -75,15 +75,15 @@ class Scores(NamedTuple):
     b: Floats
     """[N·s/m]"""
     verdict: NDArray[np.int8]
-    """Of the worst start."""
+    """Verdict on the worst start."""
     in_step: Floats
     """Fraction of the starts that come into step for good."""
     steps: Floats
-    """From the worst start; NaN where not every start comes into step."""
+    """Steps from the worst start; NaN where not every start comes into step."""
     mean_steps: Floats
-    """Of all starts; NaN where not every one comes into step."""
+    """Mean steps of all starts; NaN where not every one comes into step."""
     time: Floats
-    """From the worst start [s]; NaN where not every start comes into step."""
+    """Time from the worst start [s]; NaN where not every start comes into step."""
 
     def order(self) -> NDArray[np.int64]:
         """The couplers' indices from the best to the worst."""
@@ -91,7 +91,7 @@ class Scores(NamedTuple):
 
 
 class Margin(NamedTuple):
-    """By which factors a parameter may change, the others left, with every start still coming into step for good."""
+    """Factors by which a parameter may change, the others left, with every start still coming into step for good."""
 
     low: float
     high: float
@@ -107,9 +107,9 @@ class Variation(NamedTuple):
     parameter: str
     factor: float
     verdict: Verdict
-    """Of the worst start."""
+    """Verdict on the worst start."""
     steps: float
-    """From the worst start; NaN where not every start comes into step."""
+    """Steps from the worst start; NaN where not every start comes into step."""
 
 
 class Assessment(NamedTuple):
@@ -123,7 +123,7 @@ class Assessment(NamedTuple):
     strike_steps: tuple[float, ...]
     """The same by the strikes of the front wheel alone; NaN where it does not stay within the band at them."""
     time: float
-    """From the worst start [s]."""
+    """Time from the worst start [s]."""
     paths: Floats
     """θ2 at the sections [rad] from each start, shape (starts, sections); NaN after the last."""
     swing: tuple[float, float]
@@ -131,15 +131,15 @@ class Assessment(NamedTuple):
     multiplier: float
     """What a step leaves of a small error, on the limit cycle."""
     speed: float
-    """On the limit cycle [m/s]."""
+    """Mean speed on the limit cycle [m/s]."""
     damper_loss: float
-    """On the limit cycle [J/m]."""
+    """Energy that the damper takes on the limit cycle [J/m]."""
     sensitivity: tuple[Variation, ...]
     margins: dict[str, Margin]
 
     @property
     def worst_steps(self) -> float:
-        """From the worst start; NaN where not every start comes into step."""
+        """Steps from the worst start; NaN where not every start comes into step."""
         return max(self.steps) if not any(map(math.isnan, self.steps)) else math.nan
 
 
@@ -179,7 +179,7 @@ def search(
     task: Task,
     k: tuple[float, float],
     b: tuple[float, float],
-    tolerance: float = TOLERANCE,
+    tolerance: float = PART_TOLERANCE,
     report: Report = lambda count: None,
 ) -> Search:
     """Find the best couplers within bounds: on a logarithmic grid, then on ever finer ones around the best so far.
@@ -188,7 +188,7 @@ def search(
         task: rig and starts.
         k: least and greatest stiffness [N/m].
         b: least and greatest damping [N·s/m].
-        tolerance: by which part k and b may be off for the forgiving one, in [0, 1).
+        tolerance: fraction by which k and b may be off for the forgiving one, in [0, 1).
         report: told how many more couplers are done; `WORK` tells how many there are.
 
     Raises:
@@ -199,7 +199,7 @@ def search(
         raise ValueError(f'bounds must be 0 < least ≤ greatest, got {k} N/m and {b} N·s/m')
     require_rolling(task.rig)
     grid = score(task, *mesh(k, b), report=report)
-    eased = score(task, grid.k, grid.b, np.full(GRID**2, (1.0 - EASE) * task.rig.slope), report)
+    eased = score(task, grid.k, grid.b, np.full(GRID**2, (1.0 - SLOPE_TOLERANCE) * task.rig.slope), report)
 
     def fastest(k: Floats, b: Floats) -> NDArray[np.int64]:
         return score(task, k, b, report=report).order()
@@ -223,14 +223,14 @@ def forgiving_order(
 ) -> NDArray[np.int64]:
     """The couplers' indices, best first, each as good as the worst that it may turn out to be.
 
-    That is k and b each off by the tolerance either way, and the slope gentler by EASE.
+    That is k and b each off by the tolerance either way, and the slope gentler by SLOPE_TOLERANCE.
     """
     factors = (1.0 - tolerance, 1.0, 1.0 + tolerance)
     cases = [
         (k_factor, b_factor, slope)
         for k_factor in factors
         for b_factor in factors
-        for slope in (task.rig.slope, (1.0 - EASE) * task.rig.slope)
+        for slope in (task.rig.slope, (1.0 - SLOPE_TOLERANCE) * task.rig.slope)
     ]
     scores = score(
         task,
@@ -242,7 +242,7 @@ def forgiving_order(
     return _worst_of(scores, np.arange(len(scores.k)).reshape(CASES, -1))
 
 
-def assess(task: Task, k: float, b: float, tolerance: float = TOLERANCE) -> Assessment:
+def assess(task: Task, k: float, b: float, tolerance: float = PART_TOLERANCE) -> Assessment:
     """Tell all of one coupler.
 
     Raises:
@@ -292,7 +292,7 @@ def _edge(task: Task, rig: RigParams, name: str, limit: float) -> tuple[float, V
     good, spoilt, verdict = 1.0, limit, None
     if name == 'slope':  # steeper than α no wheel stands on a spoke
         spoilt = min(limit, min(rig.front.alpha, rig.rear.alpha) / rig.slope * (1 - 1e-9))
-    for _ in range(LOOKS):
+    for _ in range(MARGIN_ROUNDS):
         factors = np.geomspace(good, spoilt, MARGIN_STEPS + 1)
         verdicts = _score(task, _multiplied(rig, name, factors))[0]
         bad = np.flatnonzero(verdicts > Verdict.IN_STEP)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dcdrw_msgs_py.in_step import BAND_PERCENT
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.map.limit_cycles import NEUTRAL, LimitCycles, find_limit_cycles, losses
-from dcdrw_sim.map.regression import PHASES, fit_affine, fit_raw
+from dcdrw_sim.map.regression import TRIAL_PHASES, fit_affine, fit_raw
 from dcdrw_sim.map.return_map import Complexes, spectrum
 from dcdrw_sim.model.rigs import Rigs, rig_at, take
 from dcdrw_sim.model.start import require_rolling, starts, uncoupled_speed
@@ -54,7 +54,7 @@ class Points(NamedTuple):
 def study(
     rigs: Rigs,
     seconds: float,
-    phases: tuple[float, ...] = PHASES,
+    phases: tuple[float, ...] = TRIAL_PHASES,
     band_percent: float = BAND_PERCENT,
     theta2_band: float = BAND,
     room: int | None = None,
@@ -101,7 +101,7 @@ def _for_good(motions: Judgement, cycles: LimitCycles, starts: int, band_percent
 def judge_points(
     rigs: Rigs,
     seconds: float,
-    phases: tuple[float, ...] = PHASES,
+    phases: tuple[float, ...] = TRIAL_PHASES,
     band_percent: float = BAND_PERCENT,
     theta2_band: float = BAND,
     room: int | None = None,

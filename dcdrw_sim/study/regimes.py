@@ -29,36 +29,36 @@ Bools = NDArray[np.bool_]
 BASIN_SECONDS = 400.0
 """How long to simulate to tell from where a pair comes into step, in √(ℓ/g)."""
 BASIN_HALVINGS = 20
-AWAY = 2.0
-"""So many times the closed form's damping the limit cycle is followed from, on either side of the stall band."""
-FAR = (0.1, 10.0)
-"""b̂ in its place where the closed form has no band."""
-STEEP = 1.5
-"""So many times the closed form's slope it is followed from."""
+DAMPING_FACTOR = 2.0
+"""The limit cycle is followed from this many times the closed form's damping, on either side of the stall band."""
+FALLBACK_BAND = (0.1, 10.0)
+"""Stall band of b̂ that is assumed where the closed form has none."""
+SLOPE_FACTOR = 1.5
+"""The limit cycle is followed from this many times the closed form's slope."""
 STRIDE, SMALLEST_STRIDE = 0.03, 1e-5
-"""By which part the period grows from gait to gait: at first, and where Newton's method fails with longer ones."""
+"""Fraction by which the period grows from gait to gait: at first, and where Newton fails with longer ones."""
 MOST_STRIDES = 200
 HALVINGS = 20
-"""Of the stride in which the fold lies: the parameter is left with the square of that error."""
+"""Halvings of the stride in which the fold lies: the parameter is left with the square of that error."""
 NEWTON_STEPS, EXACT = 8, 1e-9
 """Iterations to a gait of given period, and what may be left, in rad, √(g/ℓ) and √(ℓ/g)."""
 PEAK_ROUNDS, PEAK_POINTS = 3, 9
-"""Of the search for a maximum: each round narrows it to two of eight intervals."""
+"""Rounds of the search for a maximum, and points of each: a round narrows it to two of eight intervals."""
 
 
 class Gaits(NamedTuple):
     """Limit cycles of N pairs, each with its own value of the free parameter; NaN where none is known."""
 
     values: Floats
-    """Of the parameter, shape (N,)."""
+    """Values of the parameter, shape (N,)."""
     periods: Floats
-    """Of a step [s], shape (N,)."""
+    """Durations of a step [s], shape (N,)."""
     states: Floats
     """[θ1′, θ2, θ2′] at the section, shape (N, 3)."""
     tangents: Floats
     """How [θ1′, θ2, θ2′, parameter] change with the period, shape (N, 4)."""
     derivatives: Floats
-    """Of the return map, shape (N, 3, 3)."""
+    """Derivatives of the return map, shape (N, 3, 3)."""
 
     @property
     def multipliers(self) -> Floats:
@@ -108,7 +108,9 @@ def gentlest_slopes(rigs: Rigs) -> Gaits:
     """
     pairs = [even_pair(rig_at(rigs, i)) for i in range(len(rigs.k))]
     return folds(
-        rigs, 'slope', [STEEP * gentlest_even_gait(pair.alpha, pair.k, pair.b, pair.kept).slope for pair in pairs]
+        rigs,
+        'slope',
+        [SLOPE_FACTOR * gentlest_even_gait(pair.alpha, pair.k, pair.b, pair.kept).slope for pair in pairs],
     )
 
 
@@ -125,8 +127,8 @@ def stall_bands(rigs: Rigs) -> tuple[Gaits, Gaits]:
     for i, end in enumerate(ends):
         rig = rig_at(rigs, i)
         pair = even_pair(rig)
-        low, high = even_stall_band(pair.alpha, pair.k, rig.slope, pair.kept) or FAR
-        end[:] = pair.damping * low / AWAY, pair.damping * high * AWAY
+        low, high = even_stall_band(pair.alpha, pair.k, rig.slope, pair.kept) or FALLBACK_BAND
+        end[:] = pair.damping * low / DAMPING_FACTOR, pair.damping * high * DAMPING_FACTOR
     return folds(rigs, 'b', ends[:, 0]), folds(rigs, 'b', ends[:, 1])
 
 
@@ -207,9 +209,9 @@ class Basin(NamedTuple):
     """What becomes of a pair from a grid of starts: P phases, Q speeds."""
 
     phases: Floats
-    """In steps, shape (P,)."""
+    """Phases of the starts, in steps, shape (P,)."""
     speeds: Floats
-    """Of both wheels, as fractions of those of their uncoupled limit cycles, shape (Q,)."""
+    """Speeds of both wheels, as fractions of those of their uncoupled limit cycles, shape (Q,)."""
     verdicts: NDArray[np.int8]
     """`Verdict`, shape (P, Q)."""
     steps: Floats
@@ -307,7 +309,7 @@ def _gaits(rigs: Rigs, name: str, periods: Floats, unknowns: Floats) -> Gaits:
 
 
 def _linearize(rigs: Rigs, name: str, periods: Floats, unknowns: Floats, scales: Floats) -> tuple[Floats, Floats]:
-    """By how much a step misses the start, and the period, shape (N, 4); and how that changes, shape (N, 4, 4)."""
+    """Distance by which a step misses the start, and the period, shape (N, 4); and its derivative, shape (N, 4, 4)."""
     kicks = DIFFERENCE * scales
     around = unknowns + np.concatenate([np.zeros((1, 4)), np.eye(4), -np.eye(4)])[:, None] * kicks  # (9, N, 4)
     which = np.tile(np.arange(len(periods)), 9)
@@ -330,5 +332,5 @@ def _guesses(rigs: Rigs) -> Floats:
 
 
 def _where(which: Bools, one: Gaits, other: Gaits) -> Gaits:
-    """Of each pair the one gait or the other."""
+    """For each pair the one gait or the other."""
     return Gaits(*(np.where(which.reshape(-1, *[1] * (a.ndim - 1)), a, b) for a, b in zip(one, other, strict=True)))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dcdrw_msgs_py.in_step import BAND_PERCENT
 from dcdrw_msgs_py.quantity import build, flatten
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelParams
-from dcdrw_sim.map.regression import PHASES
+from dcdrw_sim.map.regression import TRIAL_PHASES
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.rigs import Rigs
 from dcdrw_sim.model.scaling import nondimensional
@@ -80,7 +80,7 @@ class Sweep(NamedTuple):
     y: Axis
     seconds: float
     """How long to simulate."""
-    phases: tuple[float, ...] = PHASES
+    phases: tuple[float, ...] = TRIAL_PHASES
     """Starts, in steps: as `ReturnMap.at_phase`."""
     band_percent: float = BAND_PERCENT
     """In step is within ± this [% of a step]."""
@@ -143,7 +143,7 @@ def targets(name: str) -> tuple[tuple[str, ...], float]:
     if name not in known:
         near = get_close_matches(name, known, n=1)
         raise ValueError(
-            f'{name!r} is no parameter of a rig; '
+            f'{name!r} is not a parameter of a rig; '
             + (f'did you mean {near[0]}?' if near else f'there are {", ".join(known)}')
         )
     return known[name]

@@ -91,7 +91,7 @@ class Judgement(NamedTuple):
     steps: Floats
     """To synchronization: strikes up to the one from which on the pair is in step; NaN where it is not at the end."""
     time: Floats
-    """Of that strike [s]."""
+    """Time of that strike [s]."""
     strike_steps: Floats
     """Strikes up to the one from which on the error at every strike is within the band; NaN where it is not."""
     enters: NDArray[np.bool_]
@@ -105,7 +105,7 @@ class Judgement(NamedTuple):
     steps_to_settle: Floats
     """Strikes up to the first of those; NaN where it does not settle."""
     theta2: Floats
-    """At the last section [rad]; NaN where there was none."""
+    """θ2 at the last section [rad]; NaN where there was none."""
     sections: NDArray[np.int64]
     """How many the motion went through; the first is the start where that is one."""
     step_difference: NDArray[np.int64]

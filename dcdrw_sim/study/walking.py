@@ -25,8 +25,8 @@ from dcdrw_sim.study.regimes import (
 )
 from dcdrw_sim.study.verdict import BAND, Verdict
 
-PHASES = tuple(np.linspace(0.0, 1.0, 25, endpoint=False).tolist())
-"""Of the starts that are tried."""
+BASIN_PHASES = tuple(np.linspace(0.0, 1.0, 25, endpoint=False).tolist())
+"""Phases of the starts that are tried."""
 LEFT = 1e-3
 """Motions are followed until the largest multiplier leaves this of a deviation, for BASIN_SECONDS at least."""
 LONGEST = 20.0
@@ -39,7 +39,7 @@ class EvenCycle(NamedTuple):
     theta2: float
     """θ2* at the section [rad]."""
     period: float
-    """Of a step [s]."""
+    """Duration of a step [s]."""
     moduli: tuple[float, ...]
 
 
@@ -47,19 +47,19 @@ class LimitCycle(NamedTuple):
     """How a pair walks once all deviations have died out."""
 
     phase: float
-    """At the section, in steps."""
+    """Phase at the section, in steps."""
     theta2: float
     """θ2* at the section [rad]."""
     swing_percent: tuple[float, float]
     """Least and greatest phase at any instant [% of a step]."""
     period: float
-    """Of a step [s]."""
+    """Duration of a step [s]."""
     velocity: float
     """Mean, down the slope [m/s]."""
     rear_strike: float
     """When the rear wheel strikes, as a fraction of the step's time."""
     moduli: tuple[float, ...]
-    """Of the multipliers of the return map, largest first."""
+    """Moduli of the multipliers of the return map, largest first."""
     stable: bool
     closed_form: EvenCycle | None
     """None where even strikes are too slow for this slope."""
@@ -71,7 +71,7 @@ class LimitCycle(NamedTuple):
 
 
 class Reach(NamedTuple):
-    """From where a pair comes to its limit cycle."""
+    """The starts from which a pair comes to its limit cycle."""
 
     starts: int
     """Phases that were tried, both wheels on their uncoupled limit cycles."""
@@ -101,7 +101,7 @@ class Walking(NamedTuple):
     @property
     def conditions(self) -> dict[str, bool]:
         """What makes a pair walk in step, and whether it holds."""
-        cycle, basin = self.limit_cycle, self.basin or Reach(len(PHASES), 0, math.nan)
+        cycle, basin = self.limit_cycle, self.basin or Reach(len(BASIN_PHASES), 0, math.nan)
         least = basin.least_speed
         slow = '' if math.isnan(least) else f'; down to {100 * least:.0f} % of their speed it walks on'
         phases = f'{basin.lead_there} of {basin.starts} phases lead there'
@@ -167,7 +167,7 @@ def limit_cycle(rig: RigParams) -> LimitCycle | None:
 
 
 def reach(rig: RigParams, cycle: LimitCycle) -> Reach | None:
-    """How many of PHASES lead to a limit cycle, and from how slow starts the pair walks on.
+    """How many of BASIN_PHASES lead to a limit cycle, and from how slow starts the pair walks on.
 
     None on a slope on which no wheel rolls by itself, so that there is no such start.
     """
@@ -176,6 +176,6 @@ def reach(rig: RigParams, cycle: LimitCycle) -> Reach | None:
     shortest = BASIN_SECONDS * nondimensional(rig)[1].time
     needed = math.log(LEFT) / math.log(cycle.moduli[0]) * cycle.period if 0.0 < cycle.moduli[0] < 1.0 else 0.0
     seconds = min(max(shortest, needed), LONGEST * shortest)
-    ends = judge_from(rig, PHASES, np.ones(len(PHASES)), seconds)
+    ends = judge_from(rig, BASIN_PHASES, np.ones(len(BASIN_PHASES)), seconds)
     near = (ends.verdict <= Verdict.ELSEWHERE) & (abs(ends.theta2 - cycle.theta2) <= BAND)
-    return Reach(len(PHASES), int(near.sum()), float(least_speeds(rig, PHASES, seconds).max()))
+    return Reach(len(BASIN_PHASES), int(near.sum()), float(least_speeds(rig, BASIN_PHASES, seconds).max()))

@@ -5,8 +5,8 @@ from itertools import accumulate, pairwise
 from statistics import median_low
 from typing import NamedTuple
 
-LOOKS = (2, 5, 15, 60)
-"""After so many intervals the period is learned; after the last, anew."""
+LEARNING_COUNTS = (2, 5, 15, 60)
+"""Numbers of intervals after which the period is learned; after the last, it is learned anew."""
 GAP = 1.5
 """An interval longer than this many periods is a gap."""
 TOGETHER = 0.25
@@ -31,7 +31,7 @@ class _Beat(NamedTuple):
     """How a stream beats: one sample per period, or a burst of several."""
 
     period_ns: float
-    """From burst to burst."""
+    """Period from burst to burst."""
     size: float = 1.0
     """Mean number of samples in a burst."""
     together_ns: int = 0
@@ -56,7 +56,7 @@ class Cadence:
         self.burst = 1
         """Samples that arrive together: 1 where they come one by one."""
         self._intervals: list[int] = []
-        self._looks: tuple[int, ...] = LOOKS
+        self._counts: tuple[int, ...] = LEARNING_COUNTS
 
     def tick(self, stamp_ns: int) -> None:
         """Take the next stamp; one that does not move on is ignored."""
@@ -70,12 +70,12 @@ class Cadence:
         self._last_ns = stamp_ns
         intervals = self._intervals
         intervals.append(interval)
-        if len(intervals) in self._looks:
+        if len(intervals) in self._counts:
             self._beat = beat = _learned(intervals)
             self.period_ns, self.burst = round(beat.period_ns / beat.size), round(beat.size)
-            if len(intervals) == LOOKS[-1]:
+            if len(intervals) == LEARNING_COUNTS[-1]:
                 self._settle()
-                self._looks = LOOKS[-1:]
+                self._counts = LEARNING_COUNTS[-1:]
 
     def jump(self, stamp_ns: int) -> None:
         """Go on from another stamp, without a gap: the source has started anew."""

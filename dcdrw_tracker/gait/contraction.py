@@ -51,7 +51,7 @@ class Decay(NamedTuple):
     """Where a geometric decay of known ratio tends: e[k] = limit + start · ratio^(k − first)."""
 
     limit: float = math.nan
-    """In the unit of the errors; NaN, as `start`, where it tends nowhere."""
+    """The limit, in the unit of the errors; NaN, as `start`, where it tends nowhere."""
     start: float = math.nan
     """Distance from the limit at the first error that was looked at."""
     ratio: float = math.nan

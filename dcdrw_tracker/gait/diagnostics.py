@@ -97,7 +97,7 @@ _LEVELS = {
     PairState.SLIPPED: Level.WARN,
     PairState.LOST: Level.WARN,
 }
-"""Of the states that are not OK."""
+"""The level and message of each state that is not OK."""
 
 
 def phase_text(phase: float) -> str:
@@ -138,7 +138,7 @@ HINTS: dict[Hint, str] = {
 REFUSALS: dict[Refusal, str] = {
     'unreadable': 'a wheel is missing, or the message is malformed (see the parameters front_joint and rear_joint)',
     'unpaired': "each wheel comes in messages of its own, and the rear one's stay away",
-    'not finite': 'a rotation is no finite number',
+    'not finite': 'a rotation is not a finite number',
     'repeated': 'the stamp stands still',
     'reversed': 'the stamp goes back',
     'future': "the stamp lies ahead of this node's clock (do the machines' clocks agree? is use_sim_time the same?)",

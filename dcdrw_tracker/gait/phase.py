@@ -18,7 +18,7 @@ from dcdrw_tracker.gait.rotation import Rotation, Strike, Tolerance
 
 Refusal = Literal['unreadable', 'unpaired', 'not finite', 'repeated', 'reversed', 'future', 'outlier']
 """Why a sample is refused: the message has neither wheel, the other wheel's message of that time is missing, a rotation
-is no number, the stamp stands still, goes back or lies ahead of the clock, or no wheel turns that fast."""
+is not a number, the stamp stands still, goes back or lies ahead of the clock, or no wheel turns that fast."""
 
 Cause = Literal['announced', 'stamp', 'rotation']
 """Why the source is taken to have started anew: it says so, its stamps went back, or its rotations jumped."""
@@ -27,7 +27,7 @@ Hint = Literal['front_sign', 'rear_sign', 'unit']
 """A parameter that is probably set wrongly, judged by how the wheels seem to turn."""
 
 LARGEST_ROTATION = 1e9
-"""Beyond this a rotation is no measurement, and a double no longer tells a strike [rad]."""
+"""Beyond this a rotation is not a measurement, and a double no longer tells a strike [rad]."""
 UNITS = {'rad': 1.0, 'deg': math.pi / 180.0, 'rev': math.tau}
 """Units in which a source may give its rotations, in rad."""
 UPHILL_STEPS = 3
@@ -93,7 +93,7 @@ class PhaseUpdate(NamedTuple):
     footfalls: tuple[Footfall, ...]
     """Strikes since the last sample, in the order of time."""
     clock_ns: int = 0
-    """By how much the source's clock has been stepped so far; stamps minus this run on evenly."""
+    """Sum of the steps of the source's clock so far; stamps minus this run on evenly."""
     held: tuple[PhaseSample, ...] = ()
     """Phases of samples before it that had been held back until this one agreed."""
 
@@ -102,12 +102,12 @@ class Restart(NamedTuple):
     """The source has started anew."""
 
     stamp_ns: int
-    """Of the first sample after it."""
+    """Stamp of the first sample after it."""
     cause: Cause
     seconds: float
-    """From the last sample before it, by the stamps [s]."""
+    """Time since the last sample before it, by the stamps [s]."""
     front: float
-    """By how much the rotation ψ as the source gives it jumped [rad]."""
+    """Jump of the rotation ψ as the source gives it [rad]."""
     rear: float
 
 
@@ -115,16 +115,16 @@ class ClockStep(NamedTuple):
     """The stamps have jumped, yet the motion went on: the clock of the source was set."""
 
     stamp_ns: int
-    """Of the first sample after it."""
+    """Stamp of the first sample after it."""
     seconds: float
-    """By how much [s]."""
+    """Size of the step [s]."""
 
 
 class PhaseStatus(NamedTuple):
     """A snapshot of the estimator, for diagnostics."""
 
     stamp_ns: int
-    """Of the last sample that was accepted; 0 where there was none."""
+    """Stamp of the last sample that was accepted; 0 where there was none."""
     accepted: int
     refused: dict[Refusal, int]
     """How many were refused for good, by the reason; with `accepted` they are all that came."""

@@ -8,7 +8,7 @@ from std_msgs.msg import Float64, Int32
 
 from dcdrw_msgs_py.diagnosis import Diagnosis
 from dcdrw_msgs_py.messages import JointSampleReader, PhaseSampleWriter, footfall_message
-from dcdrw_msgs_py.node import Age, Parameters, advertise, follow_runs, listen, report, run
+from dcdrw_msgs_py.node import Age, Parameters, advertise, follow_runs, listen, publish_diagnosis, run
 from dcdrw_msgs_py.rig import FRONT
 from dcdrw_msgs_py.samples import LoneWheel
 from dcdrw_msgs_py.topics import FOOTFALLS, JOINT_STATES, PHASE_STATE, PHI, STEP_DIFFERENCE
@@ -37,7 +37,7 @@ class PhaseEstimatorNode(Node):
         self._step_difference = advertise(self, STEP_DIFFERENCE)
         self._footfalls = {wheel: advertise(self, topic) for wheel, topic in FOOTFALLS.items()}
         self._age = Age()
-        report(self, self._diagnose)
+        publish_diagnosis(self, self._diagnose)
         follow_runs(self, self._reader.runs)
         listen(self, JOINT_STATES, self._on_joints)
         self.get_logger().info(f'waiting for the joints {params.front_joint} and {params.rear_joint}')

@@ -28,7 +28,7 @@ class Tolerance(NamedTuple):
     max_speed: float
     """The fastest that the wheel can turn [rad/s]."""
     rollover: float = math.nan
-    """By how much the rotation jumps where the source's counter rolls over [rad]; NaN where that is not known."""
+    """Jump of the rotation where the source's counter rolls over [rad]; NaN where that is not known."""
 
 
 class Strike(NamedTuple):

@@ -28,9 +28,9 @@ NOISE_MEMORY = 1.0
 NOISE_SPAN = 3.0
 """So many times the noise, as root mean square, it may carry the smoothed error beyond the band."""
 SURPRISE = 5.0
-"""An error that differs by more from what its past and rate foretell is no noise [%]."""
+"""An error further than this from what its past and rate predict is motion, not noise [%]."""
 FASTEST = 100.0
-"""A speed beyond this is no measurement [rad/s]."""
+"""A speed beyond this is not a measurement [rad/s]."""
 LONG_WAY = 0.1
 """A wheel that turns further than this between two samples may strike unseen [rad]."""
 
@@ -70,7 +70,7 @@ class SyncStatus(NamedTuple):
     """A snapshot of the monitor, for diagnostics and summaries. Counts run from the last start of the source."""
 
     stamp_ns: int = 0
-    """Of the last sample; 0 where there was none."""
+    """Stamp of the last sample; 0 where there was none."""
     phase: float = math.nan
     """p, in steps."""
     error: float = math.nan
@@ -99,7 +99,7 @@ class SyncStatus(NamedTuple):
     """A step has slipped within the last `hold_steps` steps."""
     losses: int = 0
     lost: bool = False
-    """Was synchronized, and is no more."""
+    """Was synchronized, and is no longer."""
     stalled: tuple[str, ...] = ()
     """The wheels that have stalled."""
     restarts: int = 0
@@ -334,7 +334,7 @@ class _Turning(NamedTuple):
 
     @classmethod
     def between(cls, last: Turn, now: Turn, strikes: int, dt: float, alpha: float) -> '_Turning':
-        """From both samples and the strikes between them."""
+        """Turning between two samples, from both and the strikes between them."""
         pitch, rate = 2.0 * alpha, last.rate
         if strikes == 1 and 0.0 < rate <= FASTEST and 0.0 <= now.rate <= FASTEST:
             return cls(pitch, (min((alpha - last.angle) / rate, dt),), rate, now.rate)

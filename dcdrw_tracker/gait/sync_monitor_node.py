@@ -8,7 +8,7 @@ from std_msgs.msg import Bool, Float64
 
 from dcdrw_msgs_py.diagnosis import REFUSED, Diagnosis, PairState
 from dcdrw_msgs_py.messages import PhaseSampleReader, turns_message
-from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
+from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, publish_diagnosis, run, steady_clock
 from dcdrw_msgs_py.samples import Turn
 from dcdrw_msgs_py.topics import (
     PHASE_JOINT,
@@ -45,7 +45,7 @@ class SyncMonitorNode(Node):
         self._verdict: bool | None = None
         self._state: PairState | None = None
         self._tell(False)
-        self._report = report(self, self._diagnose)
+        self._report = publish_diagnosis(self, self._diagnose)
         self.create_timer(WATCH_SECONDS, self._watch, clock=steady_clock())
         listen(self, PHASE_STATE, self._on_phase)
 

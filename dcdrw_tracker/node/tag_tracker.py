@@ -66,11 +66,11 @@ class TrackerStatus(NamedTuple):
     """A snapshot, for diagnostics."""
 
     stamp_ns: int
-    """Of the last frame; 0 before the first."""
+    """Stamp of the last frame; 0 before the first."""
     front: WheelQuality
     rear: WheelQuality
     ids: tuple[tuple[int, ...], tuple[int, ...]]
-    """Of the tags on the front wheel and on the rear one."""
+    """Ids of the tags on the front wheel and on the rear one."""
     duplicate: int
     """The tag that was last seen twice in one frame."""
     duplicate_ns: int

@@ -16,7 +16,7 @@ from dcdrw_msgs_py.diagnosis import Diagnosis, Level
 from dcdrw_msgs_py.frame import Frame
 from dcdrw_msgs_py.image_messages import camera, compressed_frame, frame, image_message, pose, tag_message
 from dcdrw_msgs_py.messages import JointSampleWriter, run_message
-from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run, steady_clock
+from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, publish_diagnosis, run, steady_clock
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND, JointSample
 from dcdrw_msgs_py.tagging import TagParams, mounts
@@ -89,7 +89,7 @@ class TagTrackerNode(Node):
                 self._tags, self._view.value, self._track.value, self._source.detector, first_run
             )
             self._start_on_pictures()
-        report(self, self._diagnose)
+        publish_diagnosis(self, self._diagnose)
 
     def destroy_node(self) -> None:
         """End the threads first: they publish."""

@@ -27,7 +27,7 @@ class VideoFile:
 
     Raises:
         OSError: there is no such file.
-        ValueError: it is no video that can be read.
+        ValueError: it is not a video that can be read.
 
     """
 
@@ -38,7 +38,7 @@ class VideoFile:
         self._path, self._given_rate = path, frame_rate
         self._capture = cv2.VideoCapture(str(path))
         if not self._capture.isOpened():
-            raise ValueError(f'{path} is no video that OpenCV reads, or it is truncated')
+            raise ValueError(f'{path} is not a video that OpenCV reads, or it is truncated')
         width, height = (int(self._capture.get(key)) for key in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
         if width * height > LARGEST_PICTURE:
             raise ValueError(f'{path} claims pictures of {width} × {height} pixels, more than a camera takes')

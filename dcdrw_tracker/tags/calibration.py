@@ -51,7 +51,7 @@ class WheelCalibration(NamedTuple):
     steps: int
     """Strikes."""
     turn: Estimate
-    """By how much downhill is turned counter-clockwise in the picture from where slope and roll put it [rad]."""
+    """Angle by which downhill is turned counter-clockwise in the picture from where slope and roll put it [rad]."""
     length: Estimate
     """ℓ, in the measure of the tags [m]; σ = 2 ℓ sin α."""
     zero: Estimate

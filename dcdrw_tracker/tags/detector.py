@@ -22,7 +22,7 @@ SMALLEST_SIDE = 10.0
 BEST_SIDE = 48.0
 """A tag whose size is known is looked for at the scale that makes its side this [px]."""
 FARTHEST_MOVE = 0.25
-"""What the edges move by more than this share of the side was no tag's outline."""
+"""A candidate whose edges move by more than this share of its side is not a tag's outline."""
 
 
 class Detection(NamedTuple):

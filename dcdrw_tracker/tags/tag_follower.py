@@ -23,7 +23,7 @@ class Sighting(NamedTuple):
     """The tags of one frame."""
 
     detections: tuple[Detection, ...]
-    """At most one of each id."""
+    """The tags that were found, at most one of each id."""
     duplicates: tuple[int, ...] = ()
     """Ids that were seen twice, so that it is unknown which is the rig's."""
 
@@ -34,7 +34,7 @@ class _Track(NamedTuple):
     stamp_ns: int
     detection: Detection
     speed: Floats
-    """Of its centre (2,) [px/s]."""
+    """Speed of the tag's centre (2,) [px/s]."""
 
 
 class TagFollower:
@@ -70,7 +70,7 @@ class TagFollower:
         return Sighting(tuple(found.values()), tuple(sorted(duplicates)))
 
     def _next_scale(self, found: Collection[Detection]) -> float:
-        """At which to search the whole picture: the tags that are found tell; else one by one, for speed."""
+        """Scale at which to search the whole picture: that of the tags found; where none is, one after the other."""
         if found:
             return min(BEST_SIDE / max(one.side for one in found), 2.0)
         self._searches += 1

@@ -18,8 +18,8 @@ Complexes = NDArray[np.complex128]
 
 WINDOW = 160
 """Tags from which the normal is learned."""
-THIN = 8
-"""Of the tags that come once the window is full, one in so many is taken, so that the window spans seconds."""
+KEEP_EVERY = 8
+"""Once the window is full, one tag in so many is kept, so that the window spans seconds."""
 NOISE_PX = 0.05
 """Least error of a corner [px]; a better fit is luck."""
 OUTLIER_PX = 0.5
@@ -50,7 +50,7 @@ class PlaneAxes(NamedTuple):
     """Horizontal within the plane."""
     up: Floats
     normal: Floats
-    """From the camera to the plane."""
+    """Unit vector from the camera to the plane."""
 
     def flatten(self, rays: Floats) -> Complexes:
         """Where rays (..., 2) meet the plane at distance 1: right + 1j up, from the point nearest to the camera."""
@@ -102,7 +102,7 @@ class ViewPlane:
     def feed(self, observations: Iterable[Observation]) -> None:
         """Take the tags of a frame; now and then, and often at first, this makes the normal anew."""
         for one in observations:
-            if len(self._window) < WINDOW or self._seen % THIN == 0:
+            if len(self._window) < WINDOW or self._seen % KEEP_EVERY == 0:
                 self._window.append(one)
             self._seen += 1
         if self._seen >= self._solve_at:

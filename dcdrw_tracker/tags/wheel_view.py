@@ -19,7 +19,7 @@ Complexes = NDArray[np.complex128]
 
 
 class PairViewParams(NamedTuple):
-    """How the camera stands, and what is no view of a wheel."""
+    """How the camera stands, and what is not a view of a wheel."""
 
     roll_deg: Annotated[
         float, Quantity('how far the camera leans to its right, by its level', 'deg', low=-180.0, high=180.0, live=True)

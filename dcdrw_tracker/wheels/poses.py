@@ -115,15 +115,15 @@ class PosePairs:
         """Take the next pose of a wheel, `front` or `rear`; returns the views that it completes, in order.
 
         Raises:
-            ValueError: no pose, as motion capture sends where it has lost a body, or a body whose axis is no spoke.
+            ValueError: no pose, as motion capture sends where it has lost a body, or a body whose axis is not a spoke.
 
         """
         if pose.stamp_ns == 0:
             raise ValueError('the stamps are zero: without their time poses tell no motion; let the source stamp them')
         if not all(map(math.isfinite, (*pose.position, *pose.orientation))):
-            raise ValueError('position or orientation is no number')
+            raise ValueError('position or orientation is not a number')
         if not abs(math.hypot(*pose.orientation) - 1.0) < 0.01:
-            raise ValueError(f'the orientation {pose.orientation} is no unit quaternion')
+            raise ValueError(f'the orientation {pose.orientation} is not a unit quaternion')
         if not any(pose.position) and not any(pose.orientation[:3]):
             raise ValueError(f'the {wheel} wheel is at the origin, unturned: a default pose, sent while it is hidden')
         latest = self._latest.get(wheel)

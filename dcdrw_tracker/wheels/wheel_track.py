@@ -71,7 +71,7 @@ class TrackStatus(NamedTuple):
     """A snapshot of one wheel, for diagnostics."""
 
     stamp_ns: int
-    """Of the last view that was taken; 0 where there was none."""
+    """Stamp of the last view that was taken; 0 where there was none."""
     psi: float
     rate: float
     taken: int

@@ -155,9 +155,12 @@ def content(**changes: object) -> dict[str, object]:
         ({'distortion_model': 'equidistant'}, 'an equidistant .* lens has 4 coefficients'),
         ({'distortion_coefficients': {'data': [0.1] * 3}}, 'plumb_bob must be 4, 5, 8, 12 or 14 numbers'),
         ({'distortion_coefficients': {'data': [math.nan] * 5}}, 'must be finite numbers'),
-        ({'distorsion_model': 'equidistant'}, 'distorsion_model is no key of a camera file; did you mean distortion_m'),
-        ({'camera_matrix': {'dat': MATRIX}}, 'dat is no key of a camera file; did you mean data'),
-        ({'lens': 'wide'}, 'lens is no key of a camera file; known are image_width'),
+        (
+            {'distorsion_model': 'equidistant'},
+            'distorsion_model is not a key of a camera file; did you mean distortion',
+        ),
+        ({'camera_matrix': {'dat': MATRIX}}, 'dat is not a key of a camera file; did you mean data'),
+        ({'lens': 'wide'}, 'lens is not a key of a camera file; known are image_width'),
     ],
 )
 def test_a_bad_file_is_refused_with_the_key_that_is_to_blame(changes, message, tmp_path):
@@ -266,7 +269,7 @@ def test_files_of_other_calibrations_are_read(text, tmp_path):
     [
         (KALIBR + KALIBR.replace('cam0', 'cam1'), 'has several cameras, cam0, cam1: keep the one'),
         (KALIBR.replace('pinhole', 'omni'), "camera_model must be pinhole, got 'omni'"),
-        (KALIBR.replace('resolution', 'resolutoin'), 'resolutoin is no key of a camera file; did you mean resolution'),
+        (KALIBR.replace('resolution', 'resolutoin'), 'resolutoin is not a key of a camera file; did you mean'),
         (KALIBR.replace('  resolution: [1280, 720]\n', ''), 'has no resolution'),
     ],
 )

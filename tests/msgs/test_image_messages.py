@@ -123,8 +123,8 @@ def test_compressed_frames_are_read():
     ('bad', 'error'),
     [
         (message('yuv411', COLOUR), "the encoding 'yuv411' is not read; let the camera send mono8"),
-        (message('bgr8', GREY), '35 bytes in rows of 5 are no bgr8 picture of 5x7'),
-        (Image(encoding='mono8', width=5, step=5), '0 bytes in rows of 5 are no mono8 picture of 5x0'),
+        (message('bgr8', GREY), '35 bytes in rows of 5 are not a bgr8 picture of 5x7'),
+        (Image(encoding='mono8', width=5, step=5), '0 bytes in rows of 5 are not a mono8 picture of 5x0'),
     ],
 )
 def test_what_is_no_picture_is_told(bad, error):
@@ -135,7 +135,7 @@ def test_what_is_no_picture_is_told(bad, error):
 def test_what_is_no_compressed_picture_is_told():
     pytest.importorskip('cv2')
     for data in (b'', b'nothing'):
-        with pytest.raises(ValueError, match=f"{len(data)} bytes of format 'jpeg' are no picture"):
+        with pytest.raises(ValueError, match=f"{len(data)} bytes of format 'jpeg' are not a picture"):
             compressed_frame(CompressedImage(format='jpeg', data=array('B', data)))
 
 

@@ -45,7 +45,7 @@ def test_joint_samples_survive(sample):
         reader.runs.announce(stamp_ns(header.stamp), header.frame_id)
     message = JointSampleWriter().write(sample)
     assert reader.read(message) == sample
-    message.header.frame_id = 'run_9'  # a frame is no protocol
+    message.header.frame_id = 'run_9'  # a frame is not a protocol
     assert reader.read(message) == sample
 
 

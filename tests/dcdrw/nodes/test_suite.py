@@ -20,5 +20,5 @@ def test_estimator_monitor_and_synchronizer_work_in_one_process(bench):
 
 
 def test_a_node_that_does_not_exist_is_named():
-    with pytest.raises(ValueError, match='phase_estimater is no node of the suite; there are simulator, '):
+    with pytest.raises(ValueError, match='phase_estimater is not a node of the suite; there are simulator, '):
         make_nodes(('phase_estimater',))

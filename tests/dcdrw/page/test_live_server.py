@@ -266,7 +266,7 @@ def test_browsers_that_leave_at_once_are_no_error(served, caplog):
         f'GET /ws HTTP/1.1\r\nHost: 127.0.0.1:{served.port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n'
         'Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n'
     ).encode()
-    wrong = b'\x81\x81\0\0\0\0{'  # a masked frame of text that is no command
+    wrong = b'\x81\x81\0\0\0\0{'  # a masked frame of text that is not a command
     for i in range(200):
         with socket.create_connection(('127.0.0.1', served.port)) as browser:
             browser.sendall(request + i % 2 * wrong)

@@ -423,7 +423,7 @@ def test_killed_ros2_bag_record_is_read_and_mended(tmp_path):
 def test_wrong_files_are_told_apart(tmp_path):
     (tmp_path / 'empty').mkdir()
     (tmp_path / 'notes.txt').write_text('not a bag')
-    (tmp_path / 'text.mcap').write_text('this is no MCAP file, whatever its name says')
+    (tmp_path / 'text.mcap').write_text('this is not an MCAP file, whatever its name says')
     (tmp_path / 'text.db3').write_text('nor is this a data base')
     (tmp_path / 'short.mcap').write_bytes(b'\x89MCAP0\r\n')
     (tmp_path / 'torn').mkdir()
@@ -434,10 +434,10 @@ def test_wrong_files_are_told_apart(tmp_path):
         (tmp_path / 'several' / part).write_bytes(b'\x89MCAP0\r\n')
     for name, message in {
         'nowhere': 'does not exist',
-        'empty': 'is no recording: it has no *.mcap, *.db3 file',
-        'notes.txt': 'is no recording: give its folder, or a file that ends in .mcap, .db3',
-        'text.mcap': 'is no MCAP file',
-        'text.db3': 'is no sqlite3 file',
+        'empty': 'is not a recording: it has no *.mcap, *.db3 file',
+        'notes.txt': 'is not a recording: give its folder, or a file that ends in .mcap, .db3',
+        'text.mcap': 'is not an MCAP file',
+        'text.db3': 'is not an sqlite3 file',
         'short.mcap': 'nothing was recorded',
         'torn': 'has metadata.yaml but none of the files',
         'pointer.mcap': 'is a pointer of Git LFS',

@@ -103,7 +103,7 @@ def test_a_bad_file_is_refused_with_what_is_wrong_in_it(tmp_path, content, messa
 def test_bytes_that_are_no_text_are_refused(tmp_path):
     path = tmp_path / 'case.json'
     path.write_bytes(b'\xff\xfe\x00')
-    with pytest.raises(ValueError, match=r'case\.json, line 1: byte 0xff is no UTF-8 text'):
+    with pytest.raises(ValueError, match=r'case\.json, line 1: byte 0xff is not UTF-8 text'):
         read_cases(path)
 
 
@@ -122,9 +122,9 @@ def test_square_wheels_are_allowed(tmp_path):
 @pytest.mark.parametrize(
     ('content', 'message'),
     [
-        (CASE | {'sloep': 0.03}, r'sloep is no key of a case; did you mean slope\?'),
-        ({'case': CASE | {'bb': 1.0}}, 'bb is no key of a case'),
-        ({'case': CASE, 'strike': []}, r'strike is no key of a case; did you mean strikes\?'),
+        (CASE | {'sloep': 0.03}, r'sloep is not a key of a case; did you mean slope\?'),
+        ({'case': CASE | {'bb': 1.0}}, 'bb is not a key of a case'),
+        ({'case': CASE, 'strike': []}, r'strike is not a key of a case; did you mean strikes\?'),
     ],
 )
 def test_unknown_keys_are_refused_with_a_suggestion(tmp_path, content, message):

@@ -208,7 +208,7 @@ def test_a_rocking_wheel_strikes_both_ways():
         ([[0.0, 1.0, 0.0, 1.0]], {'slope': 1.0}, 'slope must be'),
         ([[0.0, 1.0, 0.0, 1.0]], {'D0': math.inf}, 'D0 must be'),
         ([[0.0, 1.0, 0.0, 1.0]], {'k': [1.0, 2.0]}, r'k must be a scalar or of shape \(1,\), got \(2,\)'),
-        ([[0.0, 1.0, 0.0, 1.0]], {'mass': 1.0}, 'mass is no parameter of a rig; known are front.length'),
+        ([[0.0, 1.0, 0.0, 1.0]], {'mass': 1.0}, 'mass is not a parameter of a rig; known are front.length'),
         ([[0.0, 1.0, 0.0, 1.0]], {'seconds': math.nan}, 'seconds must be'),
         ([[0.0, 1.0, 0.0, 1.0]], {'seconds': -1.0}, 'seconds must be'),
         ([[0.0, 1.0, 0.0, 1.0]], {'capacity': 0}, 'capacity'),

@@ -17,7 +17,7 @@ from dcdrw_sim.relatives.rigid_pair import (
     RigidPair,
     energy_per_metre,
     fastest_phase,
-    gentlest_slope,
+    gentlest_slope_at_phase,
     slope_for_velocity,
 )
 from tests.sim.rigs import ALPHA, between
@@ -270,12 +270,12 @@ def test_striking_at_once_it_is_a_single_wheel():
     gait = RigidPair(PAPER, 0.0).gait()
     wheel = PAPER.front
     assert gait.velocity == pytest.approx(rimless_wheel.limit_cycle_velocity(wheel, PAPER.slope, 9.81), rel=1e-10)
-    assert gentlest_slope(PAPER, 0.0) == pytest.approx(wheel_alone.gentlest_slope(wheel), rel=1e-9)
+    assert gentlest_slope_at_phase(PAPER, 0.0) == pytest.approx(wheel_alone.gentlest_slope(wheel), rel=1e-9)
 
 
 @pytest.mark.parametrize('phase', [0.0, 0.25, 0.5, 0.9])
 def test_above_the_gentlest_slope_it_rolls_below_it_does_not(phase):
-    least = gentlest_slope(PAPER, phase)
+    least = gentlest_slope_at_phase(PAPER, phase)
     above, below = (RigidPair(PAPER._replace(slope=least * part), phase) for part in (1.0001, 0.9999))
     assert above.gait().velocity > 0.0
     assert math.isnan(below.gait().velocity)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 
 from dcdrw_msgs_py.rig import RigParams
-from dcdrw_sim.map.regression import PHASES, fit_affine, fit_raw
+from dcdrw_sim.map.regression import TRIAL_PHASES, fit_affine, fit_raw
 from dcdrw_sim.map.return_map import ReturnMap
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.scaling import nondimensional
@@ -38,7 +38,7 @@ def judged(rig, seconds, phases=STARTS, **columns):
 
 def test_the_contract_s_table_from_trajectories():
     D0, k, b, theta2_deg = TABLE[:, :4].T
-    found = judged(SWEEP, 200.0, PHASES, D0=D0, k=k, b=b)
+    found = judged(SWEEP, 200.0, TRIAL_PHASES, D0=D0, k=k, b=b)
     assert np.degrees(found['cycle_theta2']) == pytest.approx(theta2_deg, abs=0.01)
     assert found['multipliers'] == pytest.approx(TABLE[:, 4:], abs=1e-3)
     assert found['stable'].all()

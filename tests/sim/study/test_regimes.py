@@ -16,7 +16,7 @@ from dcdrw_sim.motion.ends import BACKWARD
 from dcdrw_sim.motion.ensemble import spread
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.relatives.even_gait import even_pair, even_stall_band, gentlest_even_gait
-from dcdrw_sim.relatives.rigid_pair import gentlest_slope as rigid_gentlest_slope
+from dcdrw_sim.relatives.rigid_pair import gentlest_slope_at_phase
 from dcdrw_sim.relatives.rimless_wheel import speed_to_pass
 from dcdrw_sim.study.regimes import (
     basin,
@@ -111,7 +111,7 @@ def test_scipy_finds_the_same_on_either_side(band):
 def test_gentlest_slope_of_loose_and_of_stiff_couplers():
     slopes = gentlest_slopes(spread(RIG, 4, {'b': (1e-3, 0.1, 1.0, 300.0)})).values
     assert slopes[0] == pytest.approx(gentlest_slope(RIG.front), rel=0.02)
-    assert slopes[3] == pytest.approx(rigid_gentlest_slope(RIG.resolved(), 0.5), abs=math.radians(0.04))
+    assert slopes[3] == pytest.approx(gentlest_slope_at_phase(RIG.resolved(), 0.5), abs=math.radians(0.04))
     assert slopes[0] < slopes[1] < slopes[2]
     closed = [gentlest_even_gait(RIG.front.alpha, RIG.k, b).slope for b in (1e-3, 0.1, 1.0, 300.0)]
     assert slopes == pytest.approx(closed, rel=0.05)

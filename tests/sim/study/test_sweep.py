@@ -138,7 +138,7 @@ def test_an_axis_is_read(text, name, values):
         ('k:1:inf:3', 'an axis is'),
         ('k:1:2:3:cubic', 'an axis is'),
         ('k:0:1:3:log', 'needs LOW and HIGH > 0'),
-        ('frontmass:1:2:3', "'frontmass' is no parameter .* did you mean front.mass"),
+        ('frontmass:1:2:3', "'frontmass' is not a parameter .* did you mean front.mass"),
         ('zzz:1:2:3', 'there are front.length'),
     ],
 )

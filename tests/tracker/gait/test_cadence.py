@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dcdrw_tracker.gait.cadence import LOOKS, Cadence
+from dcdrw_tracker.gait.cadence import LEARNING_COUNTS, Cadence
 
 MS = 1_000_000
 
@@ -53,7 +53,7 @@ def test_jitter_is_no_gap() -> None:
 def test_a_source_that_slows_down_makes_gaps_only_until_it_is_known() -> None:
     cadence = tick([*range(0, 100, 5), *range(100, 2000, 20)])
     assert cadence.status().rate == pytest.approx(50.0)
-    assert cadence.status().gaps <= LOOKS[-1]
+    assert cadence.status().gaps <= LEARNING_COUNTS[-1]
 
 
 def test_a_jump_of_the_source_is_no_gap() -> None:

@@ -75,7 +75,7 @@ def test_what_is_no_video_is_told(tmp_path):
     with pytest.raises(FileNotFoundError, match='there is no video'):
         VideoFile(tmp_path / 'none.mp4')
     (tmp_path / 'text.mp4').write_text('no video')
-    with pytest.raises(ValueError, match='is no video that OpenCV reads, or it is truncated'):
+    with pytest.raises(ValueError, match='is not a video that OpenCV reads, or it is truncated'):
         VideoFile(tmp_path / 'text.mp4')
 
 

@@ -25,7 +25,7 @@ class Tripod(NamedTuple):
     roll: float = 0.0
     """Leans to its right [deg]."""
     distance: float = 2.0
-    """Of the plane along the line of sight [m]."""
+    """Distance of the plane along the line of sight [m]."""
     camera: Camera = CAMERA
 
     def rotation(self):
@@ -37,7 +37,7 @@ class Tripod(NamedTuple):
         return np.array(about_sight) @ np.array(about_right) @ np.array(about_down)
 
     def pixels(self, picture, depth=0.0):
-        """Of points right + 1j up of the plane, or of one that is further by `depth`."""
+        """Pixels of points right + 1j up of the plane, or of one that is further by `depth`."""
         points = np.stack((picture.real, -picture.imag, np.full(picture.shape, depth)), axis=-1)
         return self.camera.project(points @ self.rotation().T + (0.0, 0.0, self.distance))
 

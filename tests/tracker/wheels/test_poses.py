@@ -123,8 +123,8 @@ def test_a_stream_that_starts_anew_goes_on():
     ('pose', 'message'),
     [
         (PoseSample(0, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), 'the stamps are zero: without their time'),
-        (PoseSample(9, (math.nan, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), 'is no number'),
-        (PoseSample(9, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)), 'is no unit quaternion'),
+        (PoseSample(9, (math.nan, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), 'is not a number'),
+        (PoseSample(9, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)), 'is not a unit quaternion'),
         (PoseSample(9, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), 'at the origin, unturned: a default pose'),
     ],
 )
