@@ -109,10 +109,22 @@ def _suggestion(word: str, known: Mapping[str, Any] | Sequence[str]) -> str:
 
 @contextmanager
 def _raised_signals() -> Iterator[None]:
-    """Signals that ask for an end raise `Interrupted` in the main thread, so that all is left in order."""
+    """Signals that ask for an end raise `Interrupted` in the main thread, so that all is left in order.
+
+    Where a library drops that exception (Python does so in callbacks of C) it is raised again; where one turns it into
+    an error of its own (an import that was broken off), it is taken for what it was.
+    """
+    asked: list[int] = []
 
     def interrupt(number: int, _: object) -> None:
+        asked.append(number)
         raise Interrupted(number)
+
+    def dropped(what: Any) -> None:
+        if isinstance(what.exc_value, Interrupted):  # a little later, for in this hook it would be dropped again
+            threading.Timer(0.02, os.kill, (os.getpid(), what.exc_value.number)).start()
+        else:
+            sys.__unraisablehook__(what)
 
     if threading.current_thread() is not threading.main_thread():  # where no signal comes
         yield
@@ -121,9 +133,15 @@ def _raised_signals() -> Iterator[None]:
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # by nohup
         numbers.append(signal.SIGHUP)
     before = {number: signal.signal(number, interrupt) for number in numbers}
+    sys.unraisablehook = dropped
     try:
         yield
+    except Exception as error:
+        if asked:
+            raise Interrupted(asked[0]) from error
+        raise
     finally:
+        sys.unraisablehook = sys.__unraisablehook__
         for number, handler in before.items():
             signal.signal(number, handler)
 

@@ -1,5 +1,6 @@
 """A signal ends every executable at once and in silence, from its first line on."""
 
+import ctypes
 import os
 import signal
 import subprocess
@@ -10,6 +11,8 @@ from pathlib import Path
 import pytest
 
 from dcdrw import entry
+from dcdrw.command_line import _raised_signals
+from dcdrw.console import Interrupted
 from tests import ROOT
 
 pytestmark = pytest.mark.processes
@@ -30,8 +33,15 @@ NODES = [name for name in entry.EXECUTABLES if name != 'dcdrw']
 
 
 def processor_time(process: subprocess.Popen[str]) -> float:
-    """How long a process has run [ms]."""
+    """How long the main thread of a process has run [ms]."""
     return int(Path(f'/proc/{process.pid}/schedstat').read_text().split()[0]) / 1e6
+
+
+def waits(process: subprocess.Popen[str]) -> bool:
+    """Whether it needs almost no processor time any more: a node that has started and hears nothing."""
+    before = processor_time(process)
+    time.sleep(0.25)
+    return process.poll() is None and processor_time(process) - before < 5.0
 
 
 def answers_signals(process: subprocess.Popen[str]) -> bool:
@@ -68,6 +78,8 @@ def ended(arguments: list[str], number: int, delay: float, folder: Path) -> tupl
     while process.poll() is None and not (processor_time(process) >= delay and answers_signals(process)):
         assert time.monotonic() < end, 'it neither works nor ends'
         time.sleep(1e-3)
+        if answers_signals(process) and time.monotonic() > end - PATIENCE + 2.0 and waits(process):
+            break
     process.send_signal(number)
     _, errors = process.communicate(timeout=PATIENCE)
     while left := with_mark(mark):
@@ -77,9 +89,9 @@ def ended(arguments: list[str], number: int, delay: float, folder: Path) -> tupl
 
 
 @pytest.mark.parametrize('delay', DELAYS)
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize('command', COMMANDS)
-def test_a_signal_ends_a_command(command, number, delay, tmp_path):
+def test_a_signal_ends_a_command(command, delay, tmp_path):
+    number = (signal.SIGINT, signal.SIGTERM)[(COMMANDS.index(command) + DELAYS.index(delay)) % 2]
     status, errors = ended(['dcdrw', *command.split()], number, delay, tmp_path)
     assert 'Traceback' not in errors
     if command.startswith(('live', 'record')) and status == 0:
@@ -88,10 +100,10 @@ def test_a_signal_ends_a_command(command, number, delay, tmp_path):
     assert errors.count('\n') <= 1, errors
 
 
-@pytest.mark.parametrize('delay', DELAYS)
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize('name', NODES)
-def test_a_signal_ends_a_node(name, delay, tmp_path):
-    number = signal.SIGTERM if delay in (100, 400) else signal.SIGINT
+def test_a_signal_ends_a_node(name, number, tmp_path):
+    delay = DELAYS[(2 * NODES.index(name) + number) % len(DELAYS)]
     status, errors = ended([name], number, delay, tmp_path)
     assert 'Traceback' not in errors
     assert status in (0, 128 + number), errors  # 0 once it runs
@@ -108,3 +120,24 @@ def test_a_node_imports_no_library_that_few_parameters_need(name):
     code = f'import sys, {entry.EXECUTABLES[name]}; print(*sys.modules)'
     done = subprocess.run([sys.executable, '-c', code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert not {'scipy', 'numba', 'cv2', 'matplotlib', 'xarray', 'aiohttp', 'rich'} & set(done.stdout.split())
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_that_a_callback_of_c_drops_comes_again(number, capsys):
+    callback = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), number))
+    with pytest.raises(Interrupted) as interrupted, _raised_signals():
+        callback()
+        time.sleep(PATIENCE)
+    assert interrupted.value.number == number
+    assert not capsys.readouterr().err
+
+
+def test_an_interrupt_that_a_library_takes_for_an_error_of_its_own_is_an_interrupt():
+    def broken_import():
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+        except KeyboardInterrupt:
+            raise ImportError('initialization failed') from None
+
+    with pytest.raises(Interrupted), _raised_signals():
+        broken_import()
