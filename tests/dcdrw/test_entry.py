@@ -125,9 +125,13 @@ def test_a_node_imports_no_library_that_few_parameters_need(name):
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupt_that_a_callback_of_c_drops_comes_again(number, capsys):
     callback = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), number))
-    with pytest.raises(Interrupted) as interrupted, _raised_signals():
+
+    def work():
         callback()
         time.sleep(PATIENCE)
+
+    with pytest.raises(Interrupted) as interrupted, _raised_signals():
+        work()
     assert interrupted.value.number == number
     assert not capsys.readouterr().err
 
