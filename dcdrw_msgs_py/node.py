@@ -98,14 +98,19 @@ class Parameters(Generic[Params]):
         return SetParametersResult(successful=True)
 
     def _require_fixed(self, changed: Params) -> None:
-        before, after = flatten(self.value), flatten(changed)
-        for name, field in self._fields.items():
-            if not field.quantity.live and repr(after[name]) != repr(before[name]):  # a derived default is NaN
+        before = flatten(self.value)
+        for name in self._differing(changed):
+            if not self._fields[name].quantity.live:
                 raise ValueError(f'{name} is fixed while the node runs (now {before[name]}); give it at the start')
+
+    def _differing(self, changed: Params) -> list[str]:
+        """Names of the parameters that another set has otherwise."""
+        before, after = flatten(self.value), flatten(changed)
+        return [name for name in self._fields if repr(after[name]) != repr(before[name])]  # NaN differs from itself
 
     def _apply(self, parameters: list[Parameter]) -> None:
         changed = self._changed(parameters)
-        if changed is not None and changed != self.value:
+        if changed is not None and self._differing(changed):
             self.value = changed
             if self._on_change:
                 self._on_change(changed)

@@ -10,6 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
+from dcdrw_msgs_py.yaml_file import number, parse_yaml
+
 Params = TypeVar('Params', bound=tuple[Any, ...])
 
 
@@ -74,6 +76,7 @@ class Field(NamedTuple):
                 raise ValueError(f'{self.name} must be a list, got {value!r}')
             one = self._replace(kind=get_args(self.kind)[0])
             return tuple(one._replace(name=f'{self.name}[{i}]').coerce(item) for i, item in enumerate(value))
+        value = self._read(value)
         if self.kind in (int, float) and isinstance(value, (int, float)) and not isinstance(value, bool):
             if not self.quantity.allows(_as_float(value)):
                 raise ValueError(f'{self.name} must be {self.requirement}, got {value!r}{self._question(value)}')
@@ -83,6 +86,17 @@ class Field(NamedTuple):
         if self.kind in (bool, str) and isinstance(value, self.kind):
             return self._chosen(value)
         raise ValueError(f'{self.name} must be {_KIND_NAMES[self.kind]}, got {value!r}')
+
+    def _read(self, value: Any) -> Any:
+        """What was meant, where ROS or `ros2 param` takes it for something else."""
+        if self.kind is float and isinstance(value, str):  # nan, 1e-05
+            found = number(value)
+            return value if found is None else found
+        if self.kind is str and isinstance(value, bool):  # off
+            return next((word for word in self.quantity.choices if parse_yaml(word) is value), value)
+        if self.kind is str and isinstance(value, int):  # a camera's name may be 0
+            return str(value)
+        return value
 
     def _chosen(self, value: Any) -> Any:
         if self.quantity.choices and value not in self.quantity.choices:

@@ -8,11 +8,15 @@ import time
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.node import NodeNameNonExistentError
+from rclpy.parameter import get_parameter_value, parameter_value_to_python
 from sensor_msgs.msg import JointState
 
-from dcdrw.suite.executables import EXECUTABLES, PHASE_ESTIMATOR, SYNC_MONITOR, Executable
+from dcdrw.suite.executables import EXECUTABLES, PHASE_ESTIMATOR, SIMULATOR, SYNC_MONITOR, SYNCHRONIZER, Executable
 from dcdrw_msgs_py.messages import to_stamp
+from dcdrw_msgs_py.quantity import fields
 from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, PHASE_STATE, Topic
 from tests.bench import Bench
 
@@ -132,6 +136,25 @@ def test_bad_messages_are_survived(bench, node, topic, answer):
 
     bench.wait(answered, 'an answer to good messages')
     assert 'Traceback' not in bench.output(node.name)
+
+
+def as_ros2_param_sends(value: ParameterValue) -> ParameterValue:
+    """`ros2 param load` reads a dump with PyYAML, makes each value a text and reads that with PyYAML again."""
+    return get_parameter_value(str(parameter_value_to_python(value)))
+
+
+@pytest.mark.parametrize('node', [SIMULATOR, SYNCHRONIZER], ids=lambda node: node.name)
+def test_a_dump_of_its_own_is_loaded_again(bench, node):
+    bench.start(node.name, S0=1e-5 if node is SIMULATOR else math.nan)
+    names = [field.name for params in node.parameters for field in fields(params)]
+    asked = GetParameters.Request(names=names)
+    dump = bench.call(GetParameters, f'/{node.name}/get_parameters', asked).values
+    parameters = [
+        Parameter(name=name, value=as_ros2_param_sends(value)) for name, value in zip(names, dump, strict=True)
+    ]
+    request = SetParameters.Request(parameters=parameters)
+    results = bench.call(SetParameters, f'/{node.name}/set_parameters', request).results
+    assert [result.reason for result in results if not result.successful] == []
 
 
 def test_a_misspelt_parameter_is_warned_of_with_the_right_name(bench):

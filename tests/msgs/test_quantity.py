@@ -67,6 +67,19 @@ def test_fields_come_flat_in_the_order_of_declaration_with_the_defaults_of_their
     assert next(field for field in fields(Outer) if field.name == 'rest').quantity.live
 
 
+class Switched(NamedTuple):
+    mode: Annotated[str, Quantity('what to do', choices=('off', 'hold'))] = 'hold'
+    camera: Annotated[str, Quantity('which camera')] = ''
+    rest: Annotated[float, Quantity('free', derived='from size')] = 0.0
+
+
+def test_what_yaml_takes_for_something_else_is_read_as_it_was_meant():
+    assert build(Switched, {'mode': False, 'camera': 0, 'rest': '1e-05'}) == Switched('off', '0', 1e-5)
+    assert math.isnan(build(Switched, {'rest': 'nan'}).rest)
+    with pytest.raises(ValueError, match='mode must be a string, got True'):
+        build(Switched, {'mode': True})
+
+
 def test_lookup_takes_dotted_names():
     assert lookup(Outer(), 'right.size') == 2.0
 
@@ -112,7 +125,8 @@ def test_a_list_may_be_empty(nothing):
         ({'right.count': math.inf}, r'right\.count must be .*, got inf'),
         ({'left.size': 10**400}, r'left\.size must be > 0 m, got 1000'),
         ({'flag': 1}, 'flag must be true or false, got 1'),
-        ({'name': 3}, 'name must be a string, got 3'),
+        ({'name': 3.5}, 'name must be a string, got 3.5'),
+        ({'name': True}, 'name must be a string, got True'),
         ({'rest': math.inf}, 'rest must be finite s, got inf'),
         ({'ratio': -1.1}, 'ratio must be ≥ -1, ≤ 1, got -1.1'),
         ({'rigth.size': 1.0}, r'rigth\.size is not a parameter \(rig\.yaml\); did you mean right\.size\?'),
