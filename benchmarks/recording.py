@@ -1,17 +1,22 @@
 """The cost of recordings: what the recorder takes from the nodes, and how fast a recording is analyzed.
 
     python benchmarks/recording.py [--minutes 2] [--rounds 3] [--seconds 5] [--rate 1000] [--no-nodes]
+        [--lengths 1 5]
 
 First table: `dcdrw analyze` over joint states at 1 kHz, on one core, beside reading the same file message by message
 with rosbags alone; CPU time, the best of the rounds, and what an hour (3.6 million messages) takes. Goal: an hour in
 less than a minute.
 
-Second table: the suite's three processes at 1 kHz with and without a recorder of all of their topics beside them, round
+Second table: the most memory that `dcdrw analyze` and `dcdrw report` take, with all that they write, for recordings of
+two lengths. Goal: as much for the long one as for the short one.
+
+Third table: the suite's three processes at 1 kHz with and without a recorder of all of their topics beside them, round
 by round: latency from joint states to error, CPU of each process, losses, and what the recorder lacks of what was sent.
 """
 
 import argparse
 import os
+import subprocess
 import sys
 import tempfile
 import time
@@ -98,6 +103,29 @@ def compare_reading(minutes: float, rounds: int) -> None:
             print(f'{name:24} {seconds / count * 1e6:12.1f} {seconds / count * 3.6e6:10.1f} {seconds / reference:6.2f}')
 
 
+def most_memory(*arguments: str) -> float:
+    """Of a command in a process of its own [MB]."""
+    process = subprocess.Popen([sys.executable, '-m', 'dcdrw.cli', *arguments], stdout=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise SystemExit(f'dcdrw {" ".join(arguments)} ended with status {process.returncode}')
+    return usage.ru_maxrss / 1024.0
+
+
+def compare_lengths(lengths: Sequence[float]) -> None:
+    rows = []
+    for minutes in lengths:
+        with tempfile.TemporaryDirectory() as temporary:
+            bag, out = f'{temporary}/bag', f'{temporary}/out'
+            write(Path(bag), 60.0 * minutes)
+            rows.append((most_memory('analyze', bag, '--out', out), most_memory('report', bag, '--out', f'{out}.html')))
+    print(f'{"most memory [MB]":24} {"dcdrw analyze":>14} {"dcdrw report":>14}')
+    for minutes, row in zip(lengths, rows, strict=True):
+        print(f'{f"{minutes:g} min":24} ' + ' '.join(f'{value:14.1f}' for value in row))
+    print(f'{"  ratio":24} ' + ' '.join(f'{last / first:14.2f}' for first, last in zip(rows[0], rows[-1], strict=True)))
+
+
 def compare_nodes(rounds: int, seconds: float, rate: float) -> None:
     arguments = ['--ros-args', '--log-level', 'warn', '-p', f'rate:={rate}', '-p', 'slope:=0.05']
     suite = [[sys.executable, '-m', module, *arguments] for module in SUITE]
@@ -136,12 +164,16 @@ def compare_nodes(rounds: int, seconds: float, rate: float) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--minutes', type=float, default=2.0, help='length of the recording that is analyzed')
+    parser.add_argument(
+        '--lengths', type=float, nargs='+', default=(1.0, 5.0), metavar='MINUTES', help='of which memory is compared'
+    )
     parser.add_argument('--rounds', type=int, default=3)
     parser.add_argument('--seconds', type=float, default=5.0, help='measured time of the nodes in each round')
     parser.add_argument('--no-nodes', action='store_true', help='only the first table')
     parser.add_argument('--rate', type=float, default=RATE, metavar='HZ', help='of the nodes')
     options = parser.parse_args()
     compare_reading(options.minutes, options.rounds)
+    compare_lengths(options.lengths)
     if options.no_nodes:
         return 0
     with free_domain() as domain:

@@ -14,6 +14,7 @@ from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw.trials.analysis import Analysis
 from dcdrw.trials.analysis import analyze as _analyze
 from dcdrw.trials.figure import draw_trial
+from dcdrw.trials.motion import Whole
 from dcdrw.trials.results import read_trial
 from dcdrw.trials.summary import Summary, summarize
 from dcdrw_msgs_py.rig import RigParams, WheelParams
@@ -51,7 +52,7 @@ class Trial(NamedTuple):
     """A trial, simulated or recorded, as the suite's estimator and monitor judge it."""
 
     analysis: Analysis
-    """Every sample, strike and error; ``analysis.motion`` has columns of one length, among them θ1, θ2 and φ in rad."""
+    """Every sample, strike and error: ``analysis.motion`` has columns of one length, among them θ1, θ2 and φ in rad."""
     summary: Summary
     """The verdict: what `dcdrw trial` writes into summary.json."""
 
@@ -110,8 +111,9 @@ def simulate(
     settings = SimulatorParams(rate=rate, initial_phase_percent=100.0 * phase, noise_deg=noise_deg, seed=seed)
     simulated = SimulatedRig(rig, settings)
     samples = [simulated.read(i / rate, SECOND + round(i / rate * SECOND)) for i in range(round(seconds * rate) + 1)]
-    analysis = _analyze(_batches([sample for sample in samples if sample]), TrialParams.of_rig(rig))
-    return Trial(analysis, summarize(analysis))
+    whole = Whole()
+    analysis = _analyze(_batches([sample for sample in samples if sample]), TrialParams.of_rig(rig), [whole])
+    return Trial(analysis._replace(motion=whole.motion), summarize(analysis))
 
 
 def _batches(samples: list[JointSample]) -> Iterator[JointBatch]:
@@ -138,8 +140,9 @@ def analyze(path: str | Path, rig: str | Path | None = None) -> Trial:
         OSError: a file cannot be read.
 
     """
-    analysis, _ = read_trial(Path(path), rig=Path(rig) if rig else None)
-    return Trial(analysis, summarize(analysis))
+    whole = Whole()
+    analysis, _ = read_trial(Path(path), rig=Path(rig) if rig else None, sinks=[whole])
+    return Trial(analysis._replace(motion=whole.motion), summarize(analysis))
 
 
 def return_map(rig: RigParams | None = None) -> ReturnMap:

@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from datetime import datetime
 from enum import Enum
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 
 def add_force(parser: argparse.ArgumentParser) -> None:
@@ -97,10 +97,57 @@ def write_csv(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]], 
         ValueError, OSError: as `write_whole`.
 
     """
+    with table_file(path, header, force) as table:
+        table.add(rows)
+
+
+@contextmanager
+def table_file(path: Path, header: Iterable[str], force: bool = False) -> Iterator['Table']:
+    """A table that grows, and is written whole or not at all.
+
+    Raises:
+        ValueError, OSError: as `write_whole`.
+
+    """
     with write_whole(path, force) as unfinished, unfinished.open('w', encoding='utf-8', newline='') as file:
-        writer = csv.writer(file)
-        writer.writerow(header)
-        writer.writerows(rows)
+        yield Table(file, header)
+
+
+_FORMULA = ('=', '+', '-', '@', '\t', '\r')
+"""What a spreadsheet that opens a CSV file takes for the beginning of a formula."""
+
+
+class Table:
+    """CSV as every command writes it: what is unknown is empty, and text is never a formula to a spreadsheet.
+
+    Args:
+        file: to write to, opened with newline=''.
+        header: the columns' names.
+
+    """
+
+    def __init__(self, file: TextIO, header: Iterable[str]) -> None:
+        self._file, self._writer, self._marked = file, csv.writer(file), 0
+        self._writer.writerow(header)
+
+    def add(self, rows: Iterable[Iterable[Any]]) -> None:
+        """Add rows."""
+        self._writer.writerows(map(_cell, row) for row in rows)
+
+    def mark(self) -> None:
+        """Keep what there is now."""
+        self._marked = self._file.tell()
+
+    def forget(self) -> None:
+        """Take back the rows since the last mark."""
+        self._file.seek(self._marked)
+        self._file.truncate()
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, float) and math.isnan(value):
+        return ''
+    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
 
 
 def to_json(content: object) -> str:

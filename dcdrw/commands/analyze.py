@@ -2,13 +2,14 @@
 
 import argparse
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 
 from dcdrw.console import add_json, check_json, in_words, tell
 from dcdrw.drawings.figure_files import add_formats
 from dcdrw.files import add_force, free_folder
 from dcdrw.trials.expectation import add_expect, expectation_status
-from dcdrw.trials.results import describe, read_trial, result, write_results
+from dcdrw.trials.results import describe, read_trial, result, sample_file, write_results
 from dcdrw.trials.summary import summarize
 from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.topics import JOINT_STATES
@@ -71,7 +72,14 @@ def run(options: argparse.Namespace) -> int:
     states: list[PairState] = []
     for path, folder in zip(options.recordings, folders, strict=True):
         try:
-            trial, agreements = read_trial(path, rig=options.rig, topic=options.topic, namespace=options.namespace)
+            with sample_file(folder, options.force) if folder else nullcontext() as table:
+                trial, agreements = read_trial(
+                    path,
+                    rig=options.rig,
+                    topic=options.topic,
+                    namespace=options.namespace,
+                    sinks=[table] if table else [],
+                )
         except (ValueError, OSError) as error:
             if not several:
                 raise

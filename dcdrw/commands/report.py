@@ -2,14 +2,17 @@
 
 import argparse
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from functools import cache
 from pathlib import Path
 
 from dcdrw.console import add_json, check_json, in_words, tell
-from dcdrw.files import add_force, refuse_existing, write_csv, write_text
+from dcdrw.files import Table, add_force, refuse_existing, table_file, write_text
 from dcdrw.trials.day import STEP_COLUMNS, TRIAL_COLUMNS, RecordedTrial, new_name, open_trial, step_rows, table
 from dcdrw.trials.expectation import add_expect, expectation_status
 from dcdrw.trials.report_page import page
-from dcdrw.trials.results import SAMPLES_HEADER
+from dcdrw.trials.results import SAMPLES, SAMPLES_HEADER, SampleTable
 from dcdrw_msgs_py.topics import JOINT_STATES
 
 _EPILOG = """\
@@ -58,16 +61,23 @@ def run(options: argparse.Namespace) -> int:
     check_json(options)
     trials: list[RecordedTrial] = []
     lines: list[str] = []
-    for path in options.recordings:
-        try:
-            trials.append(open_trial(path, new_name(path, trials), options.rig, options.topic, options.namespace))
-            lines.append(f'{trials[-1].name}: {trials[-1].summary.sentence}')
-            for text in (*trials[-1].analysis.damage, *trials[-1].analysis.notes):
+    with _samples(tables, options.force) as open_samples:
+        for path in options.recordings:
+            name = new_name(path, trials)
+            samples = SampleTable(open_samples, _COLUMNS, (name,))
+            try:
+                trial = open_trial(path, name, options.rig, options.topic, options.namespace, [samples])
+            except (ValueError, OSError) as error:  # the other trials of the day are worth their page
+                print(f'dcdrw report: left out: {in_words(error)}', file=sys.stderr)
+                samples.begin()
+                continue
+            samples.finish()
+            trials.append(trial)
+            lines.append(f'{name}: {trial.summary.sentence}')
+            for text in (*trial.analysis.damage, *trial.analysis.notes):
                 print(f'dcdrw report: {text}', file=sys.stderr)
-        except (ValueError, OSError) as error:  # the other trials of the day are worth their page
-            print(f'dcdrw report: left out: {in_words(error)}', file=sys.stderr)
-    if not trials:
-        raise ValueError('none of the recordings can be read: there is nothing to report')
+        if not trials:
+            raise ValueError('none of the recordings can be read: there is nothing to report')
     small = {
         'trials.csv': table(TRIAL_COLUMNS, ([column(trial) for column in TRIAL_COLUMNS.values()] for trial in trials)),
         'steps.csv': table(STEP_COLUMNS, (row for trial in trials for row in step_rows(trial))),
@@ -76,15 +86,24 @@ def run(options: argparse.Namespace) -> int:
     tables.mkdir(parents=True, exist_ok=True)
     for name, content in small.items():
         write_text(tables / name, content, options.force)
-    columns = (*SAMPLES_HEADER, 'error_percent')
-    samples = (
-        (trial.name, *row)
-        for trial in trials
-        for row in zip(*(getattr(trial.analysis.motion, name).tolist() for name in columns), strict=True)
-    )
-    write_csv(tables / 'samples.csv', ('trial', *columns), samples, options.force)
     write_text(options.out, text, options.force)
     lines.append(f'Written: {options.out} and {tables}/')
     tell(options, lines, [{'trial': trial.name, **trial.summary._asdict()} for trial in trials])
     whole = len(trials) == len(options.recordings) and all(trial.summary.complete for trial in trials)
     return expectation_status(options.expect, (trial.summary.state for trial in trials)) if whole else 1
+
+
+_COLUMNS = (*SAMPLES_HEADER, 'error_percent')
+
+
+@contextmanager
+def _samples(folder: Path, force: bool) -> Iterator[Callable[[], Table]]:
+    """What opens the one table of the samples of all trials."""
+    with ExitStack() as stack:
+
+        @cache
+        def open_samples() -> Table:
+            folder.mkdir(parents=True, exist_ok=True)
+            return stack.enter_context(table_file(folder / SAMPLES, ('trial', *_COLUMNS), force))
+
+        yield open_samples

@@ -16,7 +16,7 @@ from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw.trials.analysis import Analysis, analyze
 from dcdrw.trials.expectation import add_expect, expectation_status
 from dcdrw.trials.filmed import TrackedVideo, add_film_arguments, debug_video, joint_batches, quality, write_frames
-from dcdrw.trials.results import result, write_results
+from dcdrw.trials.results import result, sample_file, write_results
 from dcdrw.trials.summary import sentence
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_tracker.node.tag_tracker import Tracked
@@ -78,8 +78,8 @@ def run(options: argparse.Namespace) -> int:
     if film.interrupted and not samples:
         raise Interrupted(film.interrupted[0])
     film.check()
-    trial = analyze(joint_batches(samples, trial_params.phase), trial_params)
-    folder.mkdir(parents=True, exist_ok=True)
+    with sample_file(folder, options.force) as table:
+        trial = analyze(joint_batches(samples, trial_params.phase), trial_params, [table])
     write_frames(frames, folder / 'frames.csv')
     try:
         rig, _, phase, sync = trial_params

@@ -8,81 +8,37 @@ from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.lone_wheels import LoneWheels
 from dcdrw.suite.parameter_file import TrialParams
+from dcdrw.trials.course import Course, Gap
+from dcdrw.trials.motion import Floats, MotionTable, Sink
 from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.rig import FRONT
 from dcdrw_msgs_py.rolling import phi_pitch
 from dcdrw_msgs_py.samples import SECOND, CouplerSample, Footfall, JointSample, PhaseSample, Turn
-from dcdrw_tracker.gait.cadence import GAP, CadenceStatus
+from dcdrw_tracker.gait.cadence import CadenceStatus
 from dcdrw_tracker.gait.pair_state import judge
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseStatus
 from dcdrw_tracker.gait.rest import moves
 from dcdrw_tracker.gait.sync import SyncMonitor, SyncStatus
 
-SHORTEST_GAP_NS = 20_000_000
-"""Over less, nothing happens that a curve would hide [ns]."""
 LEARNED = 100
 """Samples after which the estimator knows their cadence."""
-USUAL = 0.9
-"""So large a share of the intervals between samples is no longer than the usual one: also where they come in bursts."""
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
-class MotionTable(NamedTuple):
-    """Columns of one length: a row for each joint state that the estimator took, and what it made of it."""
+class Resumption(NamedTuple):
+    """Where judgement had to begin anew."""
 
-    stamp_ns: Integers
-    """Stamps by the source's clock as it was at first: a clock that was set later is set back."""
-    rotation1: Floats
-    """ψ1 as it was measured, in rad."""
-    rotation2: Floats
-    coupler_length: Floats
-    """D [m]; NaN, as Ḋ and F, where the source does not tell it."""
-    coupler_rate: Floats
-    """Ḋ [m/s]."""
-    coupler_force: Floats
-    """F [N]."""
-    theta1: Floats
-    """[rad]"""
-    omega1: Floats
-    """[rad/s]"""
-    theta2: Floats
-    omega2: Floats
-    phi: Floats
-    """[rad]"""
-    phi_rate: Floats
-    """[rad/s]"""
-    step_difference: Integers
-    restarts: Integers
-    """How often the source had started anew."""
-    error_percent: Floats
-    """100 (p − 0.5) [% of a step]; NaN where the monitor refused the sample."""
-    synchronized: NDArray[np.bool_]
-    """The monitor's verdict."""
-
-    def rows(self, part: Any) -> 'MotionTable':
-        """These rows of every column."""
-        return MotionTable(*(column[part] for column in self))
-
-    @property
-    def seconds(self) -> Floats:
-        """Time since the first row [s]."""
-        return np.asarray((self.stamp_ns - self.stamp_ns[:1]) / SECOND)
-
-    @property
-    def gaps(self) -> Integers:
-        """Rows before which samples are missing for long enough to be seen, or with which the source began anew."""
-        intervals = np.diff(self.stamp_ns)
-        if not len(intervals):
-            return np.empty(0, np.int64)
-        shortest = max(GAP * np.quantile(intervals, USUAL), SHORTEST_GAP_NS)
-        cut = (intervals > shortest) | (intervals <= 0) | (np.diff(self.restarts) != 0)
-        return np.flatnonzero(cut) + 1
+    before_ns: int
+    """Stamp of the last sample before it."""
+    stamp_ns: int
+    """Stamp of the first sample after it."""
+    row: int
+    """Row of the motion that this sample is."""
+    restarted: bool
+    """The source began anew."""
 
 
 class Analysis(NamedTuple):
@@ -90,20 +46,30 @@ class Analysis(NamedTuple):
 
     params: TrialParams
     motion: MotionTable
-    """The rows from the last sample before the wheels move on."""
-    held: MotionTable
-    """Before that."""
+    """The rows from the last sample before the wheels move on; of a long one, as many as a picture shows (`Thinned`)."""
+    samples: int
+    """Number of rows of the whole motion."""
+    start_ns: int
+    """Stamp of its first row."""
+    seconds: float
+    """How long it was, by the stamps [s]."""
+    gaps: int
+    """How often samples are missing in it for long enough to be seen."""
+    longest_gaps: tuple[Gap, ...]
+    """The longest of these, the longest first."""
     footfalls: tuple[Footfall, ...]
-    judged: int
-    """The row of `motion` with which the part begins that is judged: 0, or where judgement last had to begin anew."""
+    resumed: Resumption | None
+    """Where judgement last had to begin anew: what came before is not judged."""
     judged_footfalls: tuple[Footfall, ...]
-    """Those of that part."""
+    """Footfalls within the part that is judged."""
+    unseen: frozenset[Footfall]
+    """Footfalls between two samples with others missing in between: their times are guesses."""
     status: SyncStatus
-    """Status of a monitor that saw `motion`."""
+    """Status of a monitor that saw the motion."""
     estimator: PhaseStatus
-    """Status of an estimator that saw everything, also what came before `motion`."""
+    """Status of an estimator that saw everything, also what came before the motion."""
     cadence: CadenceStatus
-    """Gaps in the joint states from the first of `motion` on: samples that never came, or were not recorded."""
+    """Gaps in the joint states from the first of the motion on: samples that never came, or were not recorded."""
     joint_states: int
     """Messages, from the first of `motion` on; those that were refused included."""
     unreadable: str
@@ -119,21 +85,22 @@ class Analysis(NamedTuple):
         return phi_pitch(self.params.sync.front, self.params.sync.rear)
 
     def strike_errors(self) -> Iterator[tuple[Footfall, float, bool]]:
-        """Strikes of the front wheel in the part that is judged, with the error there [%], and whether each was seen.
-
-        A strike between two samples with others missing in between is not seen: its time is a guess.
-        """
-        motion = self.motion
-        begins, ends = motion.stamp_ns[motion.gaps - 1], motion.stamp_ns[motion.gaps]
+        """Strikes of the front wheel in the part that is judged, the error there [%], and whether each was seen."""
         falls = [fall for fall in self.judged_footfalls if fall.wheel == FRONT]
         errors = self.status.history
         for fall, error in zip(falls[-len(errors) :] if errors else [], errors[-len(falls) :], strict=False):
-            yield fall, error, not ((begins < fall.stamp_ns) & (fall.stamp_ns < ends)).any()
+            yield fall, error, fall not in self.unseen
+
+    @property
+    def judged(self) -> MotionTable:
+        """The part of the motion that is judged."""
+        return self.motion.rows(self.motion.row >= self.resumed.row) if self.resumed else self.motion
 
     @property
     def state(self) -> PairState:
         """What the pair did in the end. Wheels that are held after they have walked take nothing back."""
-        return judge(self.status._replace(held=self.status.held and not self.judged_footfalls))
+        held = self.status.held and not self.judged_footfalls
+        return judge(self.status._replace(held=held), fresh=self.samples > 1)
 
     @property
     def ran(self) -> bool:
@@ -144,8 +111,7 @@ class Analysis(NamedTuple):
     def why_not_run(self) -> str:
         """What was there in the place of a trial; empty where it ran."""
         if self.state is PairState.HELD:
-            seconds = self.motion.rows(slice(self.judged, None)).seconds
-            return f'the wheels were held for the {seconds[-1]:.1f} s that were recorded'
+            return f'the wheels were held for the {self.judged.seconds[-1]:.1f} s that were recorded'
         if self.state is not PairState.NO_DATA:
             return ''
         if self.unreadable:
@@ -153,12 +119,19 @@ class Analysis(NamedTuple):
         return 'no joint state was of use' if self.joint_states else 'there are no joint states'
 
 
-def analyze(batches: Iterable[JointBatch], params: TrialParams) -> Analysis:
+def analyze(batches: Iterable[JointBatch], params: TrialParams, sinks: Sequence[Sink] = ()) -> Analysis:
     """Run estimator and monitor over the joint states of a trial.
 
-    The monitor starts afresh when the wheels are let go: with the last sample before a wheel moves.
+    The monitor starts afresh when the wheels are let go: with the last sample before a wheel moves. Memory stays the
+    same however long the trial is, but for a footfall now and then.
+
+    Args:
+        batches: the joint states.
+        params: of the nodes.
+        sinks: each is given every row of the motion.
+
     """
-    trial = _Trial(params)
+    trial = _Trial(params, sinks)
     with _no_collections():
         for batch in batches:
             trial.take(batch)
@@ -178,18 +151,17 @@ def _no_collections() -> Iterator[None]:
 
 
 class _Trial:
-    def __init__(self, params: TrialParams) -> None:
+    def __init__(self, params: TrialParams, sinks: Sequence[Sink]) -> None:
         self._params = params
         self._lone = LoneWheels(params.phase)
         self._estimator = PhaseEstimator(params.phase)
         self._monitor = SyncMonitor(params.sync)
+        self._course = Course(sinks)
         self._moving = False
-        self._held = self._received = 0
-        self._rows = 0
-        self._footfalls: list[Footfall] = []
-        self._restarts = self._judged = self._first_footfall = 0
+        self._received = 0
+        self._restarts = self._first_footfall = 0
+        self._resumed: Resumption | None = None
         self._before = self._estimator.status().cadence
-        self._parts: list[list[Any]] = []
         self._last: PhaseSample | None = None
         self._unreadable = ''
 
@@ -228,7 +200,7 @@ class _Trial:
             known = [table[taken, coupler] for table in (batch.position, batch.velocity, batch.effort)]
         else:
             known = [np.full(len(taken), math.nan)] * 3
-        self._parts.append(
+        self._course.add(
             [
                 batch.stamp_ns[taken] - np.array(clock_ns),
                 batch.position[taken, front] * front_scale,
@@ -241,7 +213,6 @@ class _Trial:
                 np.array(verdicts, bool),
             ]
         )
-        self._rows += len(taken)
 
     def _dated(self, batch: JointBatch) -> JointBatch:
         """The same with the time of recording in place of missing stamps: zero while the wheels turn."""
@@ -280,7 +251,7 @@ class _Trial:
                     self._let_go(place, len(taken))
                 sync = self._monitor.update(one)
                 if self._monitor.restarts != self._restarts:
-                    self._begin_anew(len(taken))
+                    self._begin_anew(one, len(taken))
                 self._last = one
                 taken.append(place)
                 phases.append(one)
@@ -288,7 +259,7 @@ class _Trial:
                 verdicts.append(bool(sync and sync.synchronized))
                 clocks.append(clock_ns)
             if footfalls:
-                self._footfalls.extend(footfalls)
+                self._course.footfalls.extend(footfalls)
         self._received += len(columns[0])
         return taken, phases, errors, verdicts, clocks
 
@@ -296,27 +267,29 @@ class _Trial:
         self._moving = True
         self._monitor = SyncMonitor(self._params.sync)
         self._restarts = self._first_footfall = 0
-        if self._rows + taken > LEARNED:
+        self._resumed = None
+        rows = self._course.rows + taken
+        if rows > LEARNED:
             self._before = self._estimator.status().cadence
         self._received = -row
-        self._footfalls.clear()
         if self._last:
             self._monitor.update(self._last)
             self._received += 1
-            self._held = self._rows + taken - 1
-        self._judged = self._held
+        self._course.begin(max(rows - 1, 0))
 
-    def _begin_anew(self, taken: int) -> None:
+    def _begin_anew(self, phase: PhaseSample, taken: int) -> None:
         """The monitor has begun anew: what came before is judged no more."""
         self._restarts = self._monitor.restarts
-        self._judged = self._rows + taken
-        self._first_footfall = len(self._footfalls)
+        assert self._last
+        row, restarted = self._course.rows + taken - self._course.origin, phase.restarts != self._last.restarts
+        self._resumed = Resumption(self._last.stamp_ns, phase.stamp_ns, row, restarted)
+        self._first_footfall = len(self._course.footfalls)
 
-    def _cadence(self, stamp_ns: Integers) -> CadenceStatus:
+    def _cadence(self) -> CadenceStatus:
         """The estimator's gaps since the wheels were let go."""
         now, before = self._estimator.status().cadence, self._before
-        gaps, longest_ns = now.gaps - before.gaps, np.diff(stamp_ns).max(initial=0)
-        return CadenceStatus(now.rate, gaps, now.lost - before.lost, float(longest_ns) * 1e-9 if gaps else 0.0)
+        gaps, longest_ns = now.gaps - before.gaps, self._course.longest_ns
+        return CadenceStatus(now.rate, gaps, now.lost - before.lost, longest_ns * 1e-9 if gaps else 0.0)
 
     def result(self) -> Analysis:
         """All that there is."""
@@ -325,26 +298,28 @@ class _Trial:
             self._take(rest)
         if self._lone.unpaired:
             self._estimator.refuse('unpaired', self._lone.unpaired)
-        if self._lone.missing and not self._rows:
+        if self._lone.missing and not self._course.rows:
             self._unreadable = self._lone.missing
         self._estimator.note_unstamped(self._lone.unstamped)
-        motion = (
-            MotionTable(*(np.concatenate(column) for column in zip(*self._parts, strict=True)))
-            if self._parts
-            else (MotionTable(*(np.empty(0, kind) for kind in _KINDS)))
-        )
+        course = self._course
+        motion = course.motion
         return Analysis(
-            self._params,
-            motion.rows(slice(self._held, None)),
-            motion.rows(slice(self._held)),
-            tuple(self._footfalls),
-            self._judged - self._held,
-            tuple(self._footfalls[self._first_footfall :]),
-            self._monitor.status(),
-            self._estimator.status(),
-            self._cadence(motion.stamp_ns[self._held :]),
-            self._received,
-            self._unreadable,
+            params=self._params,
+            motion=motion,
+            samples=course.samples,
+            start_ns=course.start_ns,
+            seconds=(course.end_ns - course.start_ns) / SECOND,
+            gaps=course.gaps,
+            longest_gaps=tuple(course.longest_gaps),
+            footfalls=tuple(course.footfalls),
+            resumed=self._resumed,
+            judged_footfalls=tuple(course.footfalls[self._first_footfall :]),
+            unseen=frozenset(course.unseen),
+            status=self._monitor.status(),
+            estimator=self._estimator.status(),
+            cadence=self._cadence(),
+            joint_states=self._received,
+            unreadable=self._unreadable,
         )
 
 
@@ -352,9 +327,6 @@ def _columns(turns: Sequence[Turn]) -> Floats:
     """Angles and rates: np.array would take six times as long over tuples."""
     columns: Floats = np.fromiter(chain.from_iterable(turns), np.float64, 2 * len(turns)).reshape(-1, 2).T
     return columns
-
-
-_KINDS = (np.int64, *[np.float64] * 11, np.int64, np.int64, np.float64, np.bool_)
 
 
 def _missing(names: Sequence[str], wheels: Sequence[str]) -> str:

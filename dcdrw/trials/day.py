@@ -1,17 +1,18 @@
 """A day of recorded trials: each with what was recorded about it, and the tables that hold every number."""
 
-import csv
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from io import StringIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from dcdrw.files import Table
 from dcdrw.recordings.bag_folder import find_bag
 from dcdrw.recordings.recorder import PARAMETERS
 from dcdrw.trials.analysis import Analysis
+from dcdrw.trials.motion import Sink
 from dcdrw.trials.results import read_trial
-from dcdrw.trials.summary import Summary, final_band, summarize
+from dcdrw.trials.summary import Summary, summarize
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.topics import JOINT_STATES
@@ -19,8 +20,6 @@ from dcdrw_msgs_py.yaml_file import read_yaml
 from dcdrw_tracker.gait.contraction import Decay, fit_decay
 
 SIMULATED, MEASURED = 'simulated', 'measured'
-_FORMULA = ('=', '+', '-', '@', '\t', '\r')
-"""What a spreadsheet that opens a CSV file takes for the beginning of a formula."""
 
 
 class RecordedTrial(NamedTuple):
@@ -47,8 +46,8 @@ TRIAL_COLUMNS: dict[str, Any] = {
     'synchronized': lambda trial: trial.summary.synchronized,
     'initial_phase_percent': lambda trial: 100.0 * trial.analysis.status.initial_phase,
     'steps_to_synchronization': lambda trial: trial.summary.steps_to_synchronization,
-    'final_phase_low_percent': lambda trial: 50.0 + final_band(trial.analysis)[0],
-    'final_phase_high_percent': lambda trial: 50.0 + final_band(trial.analysis)[1],
+    'final_phase_low_percent': lambda trial: 50.0 + trial.analysis.status.final_band_percent[0],
+    'final_phase_high_percent': lambda trial: 50.0 + trial.analysis.status.final_band_percent[1],
     'contraction_per_step': lambda trial: trial.analysis.status.contraction,
     'limit_percent': lambda trial: 50.0 + trial.decay.limit,
     'k': lambda trial: trial.rig.k,
@@ -70,7 +69,12 @@ STEP_COLUMNS = ('trial', 'wheel', 'steps', 'seconds', 'x', 'error_percent')
 
 
 def open_trial(
-    path: Path, name: str, rig: Path | None = None, topic: str = JOINT_STATES.name, namespace: str = ''
+    path: Path,
+    name: str,
+    rig: Path | None = None,
+    topic: str = JOINT_STATES.name,
+    namespace: str = '',
+    sinks: Sequence[Sink] = (),
 ) -> RecordedTrial:
     """Analyze a recording, and read what was recorded about it.
 
@@ -78,7 +82,7 @@ def open_trial(
         ValueError, OSError: as `dcdrw.trials.results.read_trial`.
 
     """
-    analysis, _ = read_trial(path, rig=rig, topic=topic, namespace=namespace)
+    analysis, _ = read_trial(path, rig=rig, topic=topic, namespace=namespace, sinks=sinks)
     bag = find_bag(path)
     folder = bag.path if bag.path.is_dir() else bag.path.parent
     decay = fit_decay(analysis.status.history, analysis.status.contraction)
@@ -90,18 +94,10 @@ def open_trial(
 
 
 def table(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
-    """CSV; what is unknown is empty, and text is never a formula to a spreadsheet."""
+    """CSV, as a text."""
     file = StringIO()
-    writer = csv.writer(file)
-    writer.writerow(header)
-    writer.writerows(map(_cell, row) for row in rows)
+    Table(file, header).add(rows)
     return file.getvalue()
-
-
-def _cell(value: Any) -> Any:
-    if isinstance(value, float) and math.isnan(value):
-        return ''
-    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
 
 
 def step_rows(trial: RecordedTrial) -> Iterable[tuple[Any, ...]]:
@@ -112,7 +108,7 @@ def step_rows(trial: RecordedTrial) -> Iterable[tuple[Any, ...]]:
             trial.name,
             fall.wheel,
             fall.steps,
-            (fall.stamp_ns - int(trial.analysis.motion.stamp_ns[0])) / SECOND,
+            (fall.stamp_ns - trial.analysis.start_ns) / SECOND,
             fall.x,
             errors.get(fall, math.nan),
         )

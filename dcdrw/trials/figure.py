@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dcdrw.trials.analysis import Analysis, Floats, MotionTable
+from dcdrw.trials.analysis import Analysis
+from dcdrw.trials.motion import Floats, MotionTable
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_sim.figures.style import BAND, BLACK, COLUMN, WHEELS, for_print, new_figure, save
@@ -16,7 +17,7 @@ from dcdrw_sim.figures.style import BAND, BLACK, COLUMN, WHEELS, for_print, new_
 SCREEN = 10.0
 """Width on a screen [inch]."""
 LETTERS = 15
-"""Letters of POINTS that an inch of a title's line holds."""
+"""Of a title's line, in an inch of letters of POINTS."""
 _FORCE = '#555555'
 
 

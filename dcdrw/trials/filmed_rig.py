@@ -9,9 +9,9 @@ import numpy as np
 
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.suite.parameter_file import TrialParams, with_rig_options
-from dcdrw.trials.analysis import Analysis
+from dcdrw.trials.motion import MotionTable
 from dcdrw_msgs_py.rig import WheelShape
-from dcdrw_msgs_py.rolling import steps_ahead
+from dcdrw_msgs_py.rolling import phi_pitch, steps_ahead
 from dcdrw_msgs_py.tagging import TagParams, mounts
 from dcdrw_msgs_py.topics import FRONT_WHEEL, REAR_WHEEL
 from dcdrw_sim.camera.render import LookParams
@@ -64,14 +64,13 @@ class TruthError(NamedTuple):
         return f"Against the simulator's own joint states, φ is {self.phi_deg:.3f}° off (rms of {self.frames} frames)."
 
 
-def truth_error(trial: Analysis, truth: Iterable[JointBatch]) -> TruthError | None:
+def truth_error(motion: MotionTable, params: TrialParams, truth: Iterable[JointBatch]) -> TruthError | None:
     """Compare φ with the truth, which is interpolated between its samples; None where they have no time in common."""
     parts = [
         (batch.stamp_ns, batch.position[:, [batch.names.index(name) for name in (FRONT_WHEEL, REAR_WHEEL)]])
         for batch in truth
         if not batch.error
     ]
-    motion = trial.motion
     if not parts or not len(motion.stamp_ns):
         return None
     stamps, psi = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -80,6 +79,8 @@ def truth_error(trial: Analysis, truth: Iterable[JointBatch]) -> TruthError | No
         return None
     times = (motion.stamp_ns[both] - stamps[0]) * 1e-9
     psi1, psi2 = (np.interp(times, (stamps - stamps[0]) * 1e-9, column) for column in psi.T)
-    off = motion.phi[both] / trial.pitch - steps_ahead(trial.params.phase.front, trial.params.phase.rear, psi1, psi2)
-    error = trial.pitch * (off - np.round(off))
+    front, rear = params.phase.front, params.phase.rear
+    pitch = phi_pitch(front, rear)
+    off = motion.phi[both] / pitch - steps_ahead(front, rear, psi1, psi2)
+    error = pitch * (off - np.round(off))
     return TruthError(math.degrees(math.sqrt(float((error**2).mean()))), int(both.sum()))

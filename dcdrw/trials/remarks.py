@@ -4,8 +4,9 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from dcdrw.trials.analysis import Analysis
+from dcdrw.trials.analysis import Analysis, Resumption
 from dcdrw_msgs_py.rig import FRONT, REAR
+from dcdrw_msgs_py.samples import SECOND
 from dcdrw_tracker.gait.diagnostics import HINTS, REFUSALS
 from dcdrw_tracker.gait.phase import Restart
 
@@ -28,8 +29,8 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
     estimator, cadence = trial.estimator, trial.cadence
     for hint in estimator.hints:
         yield Remark(f'{HINTS[hint][0].upper()}{HINTS[hint][1:]}.', True)
-    if trial.judged:
-        yield Remark(f'{_begun_anew(trial)}; what came before is left out.', True)
+    if trial.resumed:
+        yield Remark(f'{_begun_anew(trial, trial.resumed)}; what came before is left out.', True)
     refused = sum(estimator.refusals.values())
     if refused:
         reasons = '; '.join(
@@ -40,7 +41,7 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         yield Remark(f'{refused} of {of} joint states were refused: {reasons}.', True)
     if cadence.lost:
         yield Remark(
-            f'By the stamps, {cadence.lost} of {len(trial.motion.stamp_ns) + cadence.lost} samples are missing, in '
+            f'By the stamps, {cadence.lost} of {trial.samples + cadence.lost} samples are missing, in '
             f'{_number_of(cadence.gaps, "gap")} of up to {cadence.longest:.3g} s.'
         )
     if estimator.n_uncertain:
@@ -60,16 +61,15 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         )
 
 
-def _begun_anew(trial: Analysis) -> str:
+def _begun_anew(trial: Analysis, resumed: Resumption) -> str:
     """Why and when judgement began anew for the last time."""
-    motion, first = trial.motion, trial.judged
-    before = float(motion.seconds[first - 1])
+    before = (resumed.before_ns - trial.start_ns) / SECOND
     times = trial.status.restarts
     last = f', for the last of {times} times' if times > 1 else ''
     restarted = trial.estimator.restarted
-    if motion.restarts[first] != motion.restarts[first - 1] and restarted:
+    if resumed.restarted and restarted:
         return f'The source began anew after {before:.1f} s{last}: {_cause(restarted[-1])}'
-    silence = float(motion.stamp_ns[first] - motion.stamp_ns[first - 1]) * 1e-9
+    silence = (resumed.stamp_ns - resumed.before_ns) / SECOND
     if silence > trial.params.sync.stale_after:
         return f'No sample of use came for {silence:.1f} s after {before:.1f} s{last}, and judgement begins anew there'
     return f'The wheels jumped after {before:.1f} s{last}, and judgement begins anew there'

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from dcdrw.trials.analysis import Floats
 from dcdrw.trials.day import SIMULATED, RecordedTrial
+from dcdrw.trials.motion import Floats
 from dcdrw_sim.figures.style import BAND, BLACK, BLUE, GREEN, ORANGE, PINK, SKY, VERMILION, new_figure
 
 _COLOURS = BLUE, VERMILION, GREEN, PINK, SKY, ORANGE, BLACK
@@ -90,7 +90,7 @@ def _seen_errors(trial: RecordedTrial) -> Floats:
 
 def _thinned(trial: RecordedTrial) -> tuple[Floats, Floats]:
     """Time [s] and phase [% of a step] of as many samples as a page shows, cut at gaps and where the phase wraps."""
-    motion = trial.analysis.motion.rows(slice(trial.analysis.judged, None))
+    motion = trial.analysis.judged
     phase = 100.0 * motion.phi / trial.analysis.pitch
     cuts = np.union1d(motion.gaps, np.flatnonzero(np.abs(np.diff(phase)) > 50.0) + 1)
     every = max(len(phase) // MOST_POINTS, 1)

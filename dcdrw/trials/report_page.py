@@ -10,8 +10,9 @@ from typing import Any
 from dcdrw.trials.day import RecordedTrial
 from dcdrw.trials.figure import trial_figure
 from dcdrw.trials.report_figures import colour, dashes, draw_decay, draw_steps, draw_times
-from dcdrw.trials.summary import final_band, verdict
+from dcdrw.trials.summary import verdict
 from dcdrw_msgs_py.diagnosis import PairState
+from dcdrw_msgs_py.samples import SECOND
 
 _STYLE = """
 :root { color-scheme: light; --line: #d0d4da; --soft: #f3f5f7; --ok: #006b4a; --bad: #a33c00; --text: #16191d; }
@@ -82,8 +83,6 @@ _PAGE = """<!doctype html>
 </body>
 </html>
 """
-GAPS_LISTED = 12
-"""Gaps that are listed of each trial, the longest first."""
 
 
 def page(title: str, trials: Sequence[RecordedTrial], tables: Mapping[str, str]) -> str:
@@ -130,7 +129,7 @@ _HEADS = (
     ('source', ''),
 )
 _CLASSES = {0: ' class="text name"', 1: ' class="text"'}
-"""Classes of the columns that hold text."""
+"""Of the columns that are no figures."""
 _UNKNOWN = '–'
 """A column that holds nothing else is left out."""
 
@@ -139,7 +138,7 @@ def _table(trials: Sequence[RecordedTrial]) -> str:
     rows = []
     for number, trial in enumerate(trials):
         rig, summary, samples = trial.rig, trial.summary, trial.summary.samples
-        low, high = final_band(trial.analysis)
+        low, high = trial.analysis.status.final_band_percent
         steps = summary.steps_to_synchronization
         ran = trial.analysis.ran
         cells = (
@@ -230,15 +229,14 @@ _CAPTION = 'Stance angles, phase difference with its band, footfalls and, where 
 
 def _gaps(trial: RecordedTrial) -> list[str]:
     """A line that lists the gaps."""
-    motion = trial.analysis.motion
-    seconds = motion.seconds
-    gaps = sorted(
-        ((float(seconds[row] - seconds[row - 1]), float(seconds[row - 1])) for row in motion.gaps), reverse=True
-    )
-    if not gaps:
+    analysis = trial.analysis
+    if not analysis.longest_gaps:
         return []
-    listed = ', '.join(f'{length:.2g} s at {begin:.1f} s' for length, begin in gaps[:GAPS_LISTED])
-    more = f', and {len(gaps) - GAPS_LISTED} shorter ones' if len(gaps) > GAPS_LISTED else ''
+    listed = ', '.join(
+        f'{gap.seconds:.2g} s at {(gap.begin_ns - analysis.start_ns) / SECOND:.1f} s' for gap in analysis.longest_gaps
+    )
+    others = analysis.gaps - len(analysis.longest_gaps)
+    more = f', and {others} shorter ones' if others else ''
     return [f'Gaps, the longest first: {listed}{more}.']
 
 

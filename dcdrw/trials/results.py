@@ -1,25 +1,30 @@
 """The results of a recorded trial: read and judged, held against what its nodes published, written into a folder."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any
 
 from dcdrw.console import Bar
 from dcdrw.drawings.figure_files import figure_files
-from dcdrw.files import to_json, write_csv, write_text, write_whole
+from dcdrw.files import Table, table_file, to_json, write_csv, write_text, write_whole
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.leg_recording import find_topic, leg_topics, namespace_of, wheel_batches
 from dcdrw.recordings.pose_recording import pose_batches, pose_topics
 from dcdrw.recordings.recorded_runs import recorded_runs, with_runs
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
-from dcdrw.trials.agreement import Agreement, compare
+from dcdrw.trials.agreement import Agreement, Comparison
 from dcdrw.trials.analysis import Analysis, analyze
 from dcdrw.trials.figure import draw_trial
 from dcdrw.trials.leg_walk import follow_recording
+from dcdrw.trials.motion import MotionTable, Sink
 from dcdrw.trials.summary import sentence, summarize
+from dcdrw_msgs_py.rolling import phi_pitch
 from dcdrw_msgs_py.samples import Footfall
 from dcdrw_msgs_py.topics import JOINT_STATES
 
+SAMPLES = 'samples.csv'
 SAMPLES_HEADER = ('stamp_ns', 'theta1', 'omega1', 'theta2', 'omega2', 'phi', 'phi_rate', 'step_difference', 'restarts')
 
 
@@ -29,6 +34,7 @@ def read_trial(
     rig: Path | None = None,
     topic: str = JOINT_STATES.name,
     namespace: str = '',
+    sinks: Sequence[Sink] = (),
 ) -> tuple[Analysis, dict[str, Agreement]]:
     """Analyze the trial in a recording, and hold the result against what the nodes published then.
 
@@ -38,6 +44,7 @@ def read_trial(
         rig: a parameter file; what it names takes the place of these.
         topic: where the joint states are, in any namespace.
         namespace: of the suite, where the recording has several.
+        sinks: each is given every sample; of those of a long trial, the analysis keeps only a part.
 
     Raises:
         ValueError: no recording, no such topic, or no joint states that can be read.
@@ -53,14 +60,83 @@ def read_trial(
                 params = read_parameter_file(recording.parameters, params, space)
         if rig:
             params = read_parameter_file(rig, params)
-        trial = analyze(batches, params)
+        comparison = Comparison(recording, phi_pitch(params.sync.front, params.sync.rear), space)
+        trial = analyze(batches, params, [*sinks, comparison])
         if trial.unreadable and not len(trial.motion.stamp_ns):
             mend = (
                 ' (front_joint and rear_joint in a rig file name them)' if trial.unreadable.startswith('joint') else ''
             )
             raise ValueError(f'{path}: {name}: {trial.unreadable}{mend}')
-        agreements = compare(recording, trial, space)
+        agreements = comparison.agreements()
         return trial._replace(damage=tuple(recording.damage), notes=tuple(recording.notes)), agreements
+
+
+class SampleTable:
+    """Writes every sample of a trial into a CSV file as it becomes known: a `Sink`.
+
+    Args:
+        open_table: makes the table once there is a sample.
+        columns: of a `MotionTable`.
+        label: the first cells of every row.
+
+    """
+
+    def __init__(self, open_table: Callable[[], Table], columns: Sequence[str], label: tuple[str, ...] = ()) -> None:
+        self._open, self._columns, self._label = open_table, columns, label
+        self._table: Table | None = None
+        self._error: OSError | None = None
+
+    def take(self, motion: MotionTable) -> None:
+        """Write the next rows."""
+        self._do(lambda table: table.add((*self._label, *row) for row in self._rows(motion)))
+
+    def begin(self) -> None:
+        """Take back what came before the wheels were let go."""
+        self._do(lambda table: table.forget())
+
+    def finish(self) -> None:
+        """Make the table also where there was no sample.
+
+        Raises:
+            OSError: what kept it from being written. Until then nothing is said of it: the trial is worth its verdict.
+
+        """
+        self._do(lambda table: table.mark())
+        if self._error:
+            raise self._error
+
+    def _rows(self, motion: MotionTable) -> Iterable[tuple[Any, ...]]:
+        return zip(*(getattr(motion, name).tolist() for name in self._columns), strict=True)
+
+    def _do(self, work: Callable[[Table], None]) -> None:
+        if self._error:
+            return
+        try:
+            if self._table is None:
+                self._table = self._open()
+                self._table.mark()
+            work(self._table)
+        except OSError as error:
+            self._error = error
+
+
+@contextmanager
+def sample_file(folder: Path, force: bool = False) -> Iterator[SampleTable]:
+    """What writes samples.csv into the folder of a trial, which it makes.
+
+    Raises:
+        ValueError, OSError: at the end, as `dcdrw.files.table_file`.
+
+    """
+    with ExitStack() as stack:
+
+        def open_table() -> Table:
+            folder.mkdir(parents=True, exist_ok=True)
+            return stack.enter_context(table_file(folder / SAMPLES, SAMPLES_HEADER, force))
+
+        table = SampleTable(open_table, SAMPLES_HEADER)
+        yield table
+        table.finish()
 
 
 def _joint_states(
@@ -111,7 +187,7 @@ def write_results(
     force: bool = False,
     formats: Sequence[str] = ('png',),
 ) -> None:
-    """Write summary.json, samples.csv, footfalls.csv and, where there is something to draw, the picture of a trial.
+    """Write summary.json, footfalls.csv and, where there is something to draw, the picture of a trial.
 
     Raises:
         ValueError: there is no picture, for want of matplotlib; all else is written.
@@ -120,8 +196,6 @@ def write_results(
     """
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / 'summary.json', to_json(result(trial, more)), force)
-    samples = zip(*(getattr(trial.motion, name).tolist() for name in SAMPLES_HEADER), strict=True)
-    write_csv(folder / 'samples.csv', SAMPLES_HEADER, samples, force)
     write_csv(folder / 'footfalls.csv', Footfall._fields, trial.footfalls, force)
     if trial.ran:
         for path in figure_files(folder, ['trial'], formats):

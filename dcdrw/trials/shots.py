@@ -1,6 +1,5 @@
 """Films of a simulated rig: the video, and the truth of every frame and strike beside it."""
 
-import csv
 import errno
 import random
 import shutil
@@ -9,7 +8,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dcdrw.files import write_whole
+from dcdrw.files import table_file, write_whole
 from dcdrw.suite.parameter_file import given
 from dcdrw_msgs_py.camera import write_camera
 from dcdrw_msgs_py.opencv import opencv
@@ -105,9 +104,9 @@ def film_trial(
     with ExitStack() as stack:
         write_camera(stack.enter_context(write_whole(files.camera, force)), camera)
         _write_rig(stack.enter_context(write_whole(files.rig, force)), params)
-        truth = _table(stack, files.truth, TRUTH, force)
-        strikes = _table(stack, files.strikes, STRIKES, force)
-        stamps = _table(stack, files.stamps, TRUTH[:1], force) if drop else None
+        truth = stack.enter_context(table_file(files.truth, TRUTH, force))
+        strikes = stack.enter_context(table_file(files.strikes, STRIKES, force))
+        stamps = stack.enter_context(table_file(files.stamps, TRUTH[:1], force)) if drop else None
         # Last in, first out: where the video fails, the others do not get their names either.
         video = stack.enter_context(writing_video(files.video, fps, (camera.width, camera.height), colour, force))
         lost, footing = random.Random(params.look.image_seed), None
@@ -121,16 +120,15 @@ def film_trial(
             except MotionError as error:
                 trouble = f'{simulation.time:.3f} s: {error}'
                 break
-            for strike in shots.strikes(motion):
-                strikes.writerow(strike)
+            strikes.add(shots.strikes(motion))
             footing = footing or Footing(params.scene, joints)
             report(k + 1)
             if lost.random() * 100.0 < drop:
                 continue
             video.write(renderer.draw(footing, joints, k / fps))
-            truth.writerow(shots.truth(joints))
+            truth.add([shots.truth(joints)])
             if stamps:
-                stamps.writerow((joints.stamp_ns,))
+                stamps.add([(joints.stamp_ns,)])
     if not drop:
         files.stamps.unlink(missing_ok=True)  # of a film that this one overwrites
     return FilmResult(video.frames, trouble)
@@ -225,13 +223,6 @@ def writing_video(path: Path, fps: float, size: tuple[int, int], colour: bool, f
         if not whole:
             full = shutil.disk_usage(path.parent).free < LEAST_SPACE
             raise OSError(errno.ENOSPC if full else errno.EIO, 'no space left on the disk' if full else 'truncated')
-
-
-def _table(stack: ExitStack, path: Path, columns: tuple[str, ...], force: bool) -> Any:
-    file = stack.enter_context(stack.enter_context(write_whole(path, force)).open('w', encoding='utf-8', newline=''))
-    writer = csv.writer(file)
-    writer.writerow(columns)
-    return writer
 
 
 def _write_rig(path: Path, params: FilmParams) -> None:

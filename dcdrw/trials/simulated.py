@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from dcdrw.console import interruptible
+from dcdrw.console import in_words, interruptible
 from dcdrw.recordings.bag_folder import RECORDING
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.executables import (
@@ -26,7 +26,8 @@ from dcdrw.suite.recorder_params import RecorderParams
 from dcdrw.trials.agreement import Agreement
 from dcdrw.trials.analysis import Analysis, analyze
 from dcdrw.trials.filmed_rig import FilmedRig, TruthError, truth_error
-from dcdrw.trials.results import read_trial
+from dcdrw.trials.motion import Whole
+from dcdrw.trials.results import read_trial, sample_file
 from dcdrw_control.sync.synchronizer import SynchronizerParams
 from dcdrw_msgs_py.diagnosis import Diagnosis, RecorderState, messages_of, parameters_of
 from dcdrw_msgs_py.rig import REAR
@@ -242,14 +243,16 @@ class SimulatedTrial:
         """Judge what there is, whatever happened."""
         truth: TruthError | None = None
         agreements: dict[str, Agreement] = {}
+        analysis, whole = analyze([], self._params), Whole()
+        sinks = (whole,) if self._filmed else ()
         try:
-            analysis, agreements = read_trial(self._folder / RECORDING, self._params)
-            if self._filmed:
-                with Recording(self._folder / RECORDING) as recording:
-                    truth = truth_error(analysis, recording.joints(recording.find(TRUTH)))
+            with sample_file(self._folder) as table:
+                analysis, agreements = read_trial(self._folder / RECORDING, self._params, sinks=(table, *sinks))
+                if self._filmed:
+                    with Recording(self._folder / RECORDING) as recording:
+                        truth = truth_error(whole.motion, self._params, recording.joints(recording.find(TRUTH)))
         except (ValueError, OSError) as error:
-            analysis = analyze([], self._params)
-            failure = failure or str(error)
+            failure = failure or in_words(error)
         return Course(
             failure, self._interrupted, analysis, agreements, truth, self._observer.diagnoses, self._force_on_person()
         )

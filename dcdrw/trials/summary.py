@@ -3,13 +3,11 @@
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from dcdrw.trials.analysis import Analysis
 from dcdrw.trials.remarks import Remark, remarks
 from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.quantity import flatten
-from dcdrw_msgs_py.rig import FRONT
+from dcdrw_msgs_py.samples import SECOND
 from dcdrw_tracker.gait.phase import ClockStep, Hint, Refusal, Restart
 
 
@@ -78,9 +76,9 @@ class Summary(NamedTuple):
 
 def summarize(trial: Analysis) -> Summary:
     """Everything that a program wants to know of a trial."""
-    status, seconds, state = trial.status, trial.motion.seconds, trial.state
+    status, state = trial.status, trial.state
     synchronized = state is PairState.SYNCHRONIZED
-    low, high = final_band(trial)
+    low, high = status.final_band_percent
     said = remarks(trial)
     return Summary(
         sentence=sentence(trial),
@@ -88,7 +86,7 @@ def summarize(trial: Analysis) -> Summary:
         reason=trial.why_not_run or None,
         remarks=said,
         complete=trial.ran and not trial.damage and not any(remark.rests_on_less for remark in said),
-        judged_from_s=float(seconds[trial.judged]) if trial.judged else 0.0,
+        judged_from_s=(trial.resumed.stamp_ns - trial.start_ns) / SECOND if trial.resumed else 0.0,
         synchronized=synchronized if trial.ran else None,
         initial_phase_percent=_known(100.0 * status.initial_phase),
         final_phase_percent=_known(100.0 * status.phase),
@@ -104,10 +102,10 @@ def summarize(trial: Analysis) -> Summary:
         slips=status.slips,
         losses_of_synchronization=status.losses,
         stalled=status.stalled,
-        duration_s=_known(seconds[-1]) if len(seconds) else 0.0,
+        duration_s=_known(trial.seconds),
         samples=Samples(
             joint_states=trial.joint_states,
-            phase_state=len(seconds),
+            phase_state=trial.samples,
             gaps=trial.cadence.gaps,
             lost=trial.cadence.lost,
             longest_gap_s=_known(trial.cadence.longest),
@@ -134,7 +132,7 @@ def verdict(trial: Analysis) -> str:
         return f'Not run: {trial.why_not_run}.'
     status, band = trial.status, trial.params.sync.band_percent
     start, end = 100.0 * status.initial_phase, 100.0 * status.phase
-    low, high = final_band(trial)
+    low, high = status.final_band_percent
     course = f'from {start:.1f} % to {end:.1f} % in {status.steps} steps'
     outside = f'outside ±{band:g} % of 50 %'
     return {
@@ -146,16 +144,6 @@ def verdict(trial: Analysis) -> str:
         f'{status.steps_to_synchronization} steps; in the last ones {50 + low:.1f} to {50 + high:.1f} %.',
         PairState.CONVERGING: f'Not synchronized: {course}, {outside}.',
     }[trial.state]
-
-
-def final_band(trial: Analysis) -> tuple[float, float]:
-    """Least and greatest error over the last `hold_steps` steps of the front wheel [%]; NaN without data."""
-    falls = [fall.stamp_ns for fall in trial.judged_footfalls if fall.wheel == FRONT]
-    part = trial.motion.rows(slice(trial.judged, None))
-    errors = part.error_percent[part.stamp_ns >= (falls[-trial.params.sync.hold_steps - 1 :] or [0])[0]]
-    if np.isnan(errors).all():
-        return math.nan, math.nan
-    return float(np.nanmin(errors)), float(np.nanmax(errors))
 
 
 def _known(value: float) -> float | None:

@@ -89,6 +89,8 @@ class SyncStatus(NamedTuple):
     """Strikes of the front wheel up to the one from which on the pair is in step; None while not synchronized."""
     swing_percent: tuple[float, float] = (math.nan, math.nan)
     """Least and greatest error within the last whole step of the front wheel."""
+    final_band_percent: tuple[float, float] = (math.nan, math.nan)
+    """Likewise over the last `hold_steps` whole steps and the one under way."""
     contraction: float = math.nan
     """Ratio by which a step shrinks the distance to the fixed point: the last that could be told, or NaN."""
     history: tuple[float, ...] = ()
@@ -142,6 +144,7 @@ class SyncMonitor:
         self._slipped_at: int | None = None
         self._usual = 0, 0
         self._swing = self._last_swing = math.nan, math.nan
+        self._swings: list[tuple[float, float]] = []
         self._struck_ns = {FRONT: 0, REAR: 0}
 
     def update(self, phase: PhaseSample) -> SyncSample | None:
@@ -165,6 +168,7 @@ class SyncMonitor:
         if n - last.step_difference != front_strikes - rear_strikes and not _may_miss_strikes(last, phase, dt):
             return self._restart(phase)
         self._cadence.tick(stamp_ns)
+        dt = self._cadence.seconds(dt)
         if self._rest.update(phase):  # the time for which the wheels were held counts for no stall
             self._struck_ns = {FRONT: stamp_ns, REAR: stamp_ns}
         self._is_held = self._rest.held
@@ -199,6 +203,7 @@ class SyncMonitor:
             synchronized=self._synchronized,
             steps_to_synchronization=self._since if self._synchronized else None,
             swing_percent=self._last_swing,
+            final_band_percent=self._final_band(),
             contraction=self._contraction,
             history=tuple(self._history),
             slips=self._slips,
@@ -209,6 +214,10 @@ class SyncMonitor:
             restarts=self._restarts,
             cadence=self._cadence.status(),
         )
+
+    def _final_band(self) -> tuple[float, float]:
+        lows, highs = zip(*self._swings, self._swing, strict=True)
+        return min(lows), max(highs)
 
     def _start(self, phase: PhaseSample) -> SyncSample:
         self._cadence.tick(phase.stamp_ns)
@@ -237,6 +246,9 @@ class SyncMonitor:
         ratio = contraction(tuple(self._recent))
         if not math.isnan(ratio):
             self._contraction = ratio
+        if len(self._history) > 1:  # what came before the first strike was no whole step
+            self._swings.append(self._swing)
+            del self._swings[: -self.params.hold_steps]
         self._last_swing, self._swing = self._swing, (error, error)
 
     def _take_step_difference(self, n: int) -> None:

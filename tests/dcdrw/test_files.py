@@ -1,5 +1,6 @@
 """Files are written whole or not at all, and never over others unasked."""
 
+import csv
 import json
 import math
 import re
@@ -46,6 +47,19 @@ def test_what_exists_is_overwritten_by_force_alone(tmp_path):
     with pytest.raises(ValueError, match='exists already'):
         refuse_existing([tmp_path / 'new', path])
     refuse_existing([path], force=True)
+
+
+@pytest.mark.parametrize('text', ['=1+1', '+1', '-1', '@SUM(A1)', '\t=1', '\r=1'])
+def test_text_is_never_a_formula_to_a_spreadsheet(text, tmp_path):
+    write_csv(tmp_path / 'table.csv', ['trial', 'force'], [[text, -1.5], ['a=b', math.nan]])
+    with (tmp_path / 'table.csv').open(newline='') as file:
+        assert list(csv.reader(file))[1:] == [[f"'{text}", '-1.5'], ['a=b', '']]
+
+
+def test_every_table_is_written_in_one_place():
+    """By `dcdrw.files`, which sees to it that no text runs as a formula."""
+    writers = [path for path in (ROOT / 'dcdrw').rglob('*.py') if 'csv.writer' in path.read_text()]
+    assert writers == [ROOT / 'dcdrw' / 'files.py']
 
 
 def test_a_failed_write_keeps_what_was_there(tmp_path):

@@ -128,6 +128,25 @@ def test_a_clock_that_was_set_is_said_and_costs_nothing():
     assert summary.duration_s == pytest.approx(20.0, abs=0.1)
 
 
+@pytest.mark.parametrize('size', [2, 3, 4, 7])
+def test_samples_in_bursts_give_the_same_verdict(size):
+    """Stamped on arrival: each burst comes with the last of its samples, one 20 µs after the other."""
+    last = [WALK[min(i - i % size + size, len(WALK)) - 1].stamp_ns for i in range(len(WALK))]
+    summary = summarize(
+        trial([sample._replace(stamp_ns=last[i] + 20_000 * (i % size)) for i, sample in enumerate(WALK)])
+    )
+    alone = summarize(trial(WALK))
+    assert summary.remarks == ()
+    assert summary.steps_to_synchronization == pytest.approx(alone.steps_to_synchronization, abs=1)
+    assert summary.final_band_percent == pytest.approx(alone.final_band_percent, abs=0.1)
+
+
+def test_a_single_sample_of_use_is_no_trial():
+    stuck = [sample._replace(stamp_ns=WALK[0].stamp_ns) for sample in WALK]
+    summary = summarize(trial(stuck))
+    assert (summary.state, summary.reason) == (PairState.NO_DATA, 'no joint state was of use')
+
+
 def test_wheels_that_roll_uphill_bring_a_hint_at_the_sign():
     mirrored = [sample._replace(front=Turn(-sample.front.angle, -sample.front.rate)) for sample in WALK]
     summary = summarize(trial(mirrored))
