@@ -5,7 +5,7 @@ are declared here. A value is a bare number whose unit stands in its key, a stat
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum, IntEnum
 from typing import NamedTuple, TypeVar
 
@@ -25,6 +25,8 @@ RATE_IN, AGE = 'rate in [Hz]', 'age of the last sample [s]'
 GAPS, LOST_SAMPLES, LONGEST_GAP = 'gaps', 'samples lost', 'longest gap [s]'
 RESTARTS = 'restarts of the source'
 REFUSED = 'samples refused'
+SOURCES = 'sources'
+"""Names of the nodes that publish what only one should; empty where one does."""
 
 
 def messages_of(topic: str) -> str:
@@ -114,6 +116,24 @@ class Diagnosis(NamedTuple):
     def flag(self, key: str) -> bool:
         """Whether the value under a key is true."""
         return value_text(self.values.get(key, False)) == 'true'
+
+
+def contested(diagnosis: Diagnosis, topic: str, nodes: Sequence[str]) -> Diagnosis:
+    """The same diagnosis where several nodes publish what only one should: a warning, unless it is worse already.
+
+    Args:
+        diagnosis: what there is to say besides.
+        topic: what they publish.
+        nodes: who they are; nobody, or one: all is well.
+
+    """
+    values = {**diagnosis.values, SOURCES: ', '.join(nodes) if len(nodes) > 1 else ''}
+    if len(nodes) < 2:
+        return diagnosis._replace(values=values)
+    told = (
+        f'{len(nodes)} nodes publish {topic}, where one should: {", ".join(dict.fromkeys(nodes))}; {diagnosis.message}'
+    )
+    return Diagnosis(max(diagnosis.level, Level.WARN), told, values)
 
 
 def value_text(value: Value) -> str:

@@ -35,6 +35,7 @@ from dcdrw_msgs_py.topics import (
     REAR_WHEEL,
     RESTARTS,
     SLOPE_FRAME,
+    SOURCES_JOINT,
     STEP_DIFFERENCE_JOINT,
 )
 
@@ -150,7 +151,8 @@ class PhaseSampleReader:
 
     def __init__(self) -> None:
         self._joints = Joints(
-            (FRONT_STANCE, REAR_STANCE, PHI_JOINT, STEP_DIFFERENCE_JOINT), (FRONT_STEPS, REAR_STEPS, RESTARTS)
+            (FRONT_STANCE, REAR_STANCE, PHI_JOINT, STEP_DIFFERENCE_JOINT),
+            (FRONT_STEPS, REAR_STEPS, RESTARTS, SOURCES_JOINT),
         )
 
     def read(self, message: Any) -> PhaseSample:
@@ -161,7 +163,7 @@ class PhaseSampleReader:
 
         """
         front, rear, phi, (difference, *_), *counts = self._joints.read(message)
-        steps1, steps2, restarts = (round(count) if math.isfinite(count) else 0 for count, *_ in counts)
+        steps1, steps2, restarts, sources = (round(count) if math.isfinite(count) else 0 for count, *_ in counts)
         if not math.isfinite(difference):
             raise ValueError(f'{STEP_DIFFERENCE_JOINT} must be a number, got {difference}')
         return PhaseSample(
@@ -173,6 +175,7 @@ class PhaseSampleReader:
             restarts,
             steps1,
             steps2,
+            max(sources, 1),
         )
 
 
@@ -205,17 +208,24 @@ class PhaseSampleWriter:
     """Writes `phase_state` into one message, which is used again and again."""
 
     def __init__(self) -> None:
-        self._message = JointState(
-            name=[FRONT_STANCE, REAR_STANCE, PHI_JOINT, STEP_DIFFERENCE_JOINT, FRONT_STEPS, REAR_STEPS, RESTARTS]
-        )
+        names = [FRONT_STANCE, REAR_STANCE, PHI_JOINT, STEP_DIFFERENCE_JOINT, FRONT_STEPS, REAR_STEPS, RESTARTS]
+        self._message, self._contested = JointState(name=names), JointState(name=[*names, SOURCES_JOINT])
 
     def write(self, sample: PhaseSample) -> Any:
         """The message of a sample; valid until the next call."""
-        message, (_, front, rear, phi, difference, restarts, steps1, steps2) = self._message, sample
+        message, (_, front, rear, phi, difference, restarts, steps1, steps2, sources) = self._message, sample
         message.header.stamp = to_stamp(sample.stamp_ns)
         message.position = array('d', (front.angle, rear.angle, phi.angle, difference, steps1, steps2, restarts))
         message.velocity = array('d', (front.rate, rear.rate, phi.rate, 0.0, 0.0, 0.0, 0.0))
-        return message
+        if sources == 1:
+            return message
+        contested = self._contested
+        contested.header.stamp = message.header.stamp
+        contested.position, contested.velocity = message.position + array('d', (sources,)), message.velocity + _ZERO
+        return contested
+
+
+_ZERO = array('d', (0.0,))
 
 
 def run_message(stamp: int, number: int) -> Any:

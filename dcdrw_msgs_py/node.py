@@ -246,6 +246,12 @@ def dropped(node: Node) -> dict[str, int]:
     return {name: box.dropped for name, box in inboxes.items() if isinstance(box, Inbox) and box.dropped}
 
 
+def publishers(node: Node, topic: Topic) -> list[str]:
+    """The nodes that publish a topic, by their full names, each as often as it does."""
+    ends = node.get_publishers_info_by_topic(node.resolve_topic_name(topic.name))
+    return sorted(f'{end.node_namespace.rstrip("/")}/{end.node_name}' for end in ends)
+
+
 def publish_diagnosis(node: Node, diagnose: Callable[[], Diagnosis]) -> Callable[[], None]:
     """Publish a node's diagnosis once a second, by a clock that goes on where simulated time stands still.
 

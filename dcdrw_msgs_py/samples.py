@@ -110,6 +110,8 @@ class PhaseSample(NamedTuple):
     """n1."""
     rear_steps: int = 0
     """n2."""
+    sources: int = 1
+    """How many nodes send the joint states of these wheels, where one should."""
 
 
 class Footfall(NamedTuple):

@@ -137,6 +137,8 @@ PARAMETER_EVENTS = Topic(
 FRONT_WHEEL, REAR_WHEEL, COUPLER = 'front_wheel', 'rear_wheel', 'coupler'
 FRONT_STANCE, REAR_STANCE, PHI_JOINT, STEP_DIFFERENCE_JOINT = 'front_stance', 'rear_stance', 'phi', 'step_difference'
 FRONT_STEPS, REAR_STEPS, RESTARTS = 'front_steps', 'rear_steps', 'restarts'
+SOURCES_JOINT = 'sources'
+"""Only where several nodes send the joint states of the same wheels: how many."""
 # Names of the joints in sync_state.
 PHASE_JOINT, SYNC_ERROR_JOINT = 'phase', 'sync_error'
 SLOPE_FRAME = 'slope'

@@ -7,7 +7,7 @@ from itertools import pairwise
 import pytest
 from std_srvs.srv import SetBool
 
-from dcdrw_msgs_py.diagnosis import PairState, SourceState
+from dcdrw_msgs_py.diagnosis import SOURCES, Level, PairState, SourceState
 from dcdrw_msgs_py.messages import PhaseSampleReader, diagnoses, footfall
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, PHASE_STATE, SYNC_ERROR_PERCENT, SYNC_STATE, SYNCHRONIZED
@@ -105,6 +105,19 @@ def test_killed_simulator_is_stale_and_a_new_one_is_judged_afresh(bench):
 
     bench.wait(again, 'synchronized again')
     assert abs(claimed[0]) < 8.0  # never claimed while the error, which starts at −30 %, is outside the band
+
+
+def test_two_sources_are_named_by_estimator_and_monitor(bench):
+    diagnostics = bench.hear(DIAGNOSTICS)
+    start_chain(bench)
+    bench.start('simulator', '-r', '__node:=another', **STIFF)
+
+    def warned(name: str) -> bool:
+        said = [diagnosis for message in diagnostics if (diagnosis := diagnoses(message).get(name))]
+        return bool(said) and said[-1].level >= Level.WARN and said[-1].values[SOURCES] == '/another, /simulator'
+
+    for name in ('phase_estimator', 'sync_monitor'):
+        bench.wait(partial(warned, name), f'a warning of {name} that names both')
 
 
 def test_wheels_are_held_before_they_are_let_go_and_while_they_are_paused_but_never_stalled(bench):

@@ -34,7 +34,7 @@ class Agreement(NamedTuple):
     recorded: int
     """Messages."""
     equal: int
-    """Those whose every bit the analysis gives, too."""
+    """Messages whose every bit the analysis gives, too."""
 
 
 class Comparison:
@@ -62,7 +62,7 @@ class Comparison:
         """The nodes publish also while the wheels are held."""
 
     def agreements(self) -> dict[str, Agreement]:
-        """Of the topics that were recorded, once all rows have been taken."""
+        """How far the topics that were recorded agree, once all rows have been taken."""
         found = {name: topic.end() for name, topic in self._topics.items()}
         return {name: agreement for name, agreement in found.items() if agreement.recorded}
 

@@ -46,7 +46,7 @@ class Analysis(NamedTuple):
 
     params: TrialParams
     motion: MotionTable
-    """The rows from the last sample before the wheels move on; of a long one, as many as a picture shows (`Thinned`)."""
+    """The rows from the last sample before the wheels move on; of many, those that a picture shows (`Thinned`)."""
     samples: int
     """Number of rows of the whole motion."""
     start_ns: int

@@ -12,7 +12,7 @@ from dcdrw_msgs_py.samples import SECOND, Footfall
 AT_ONCE = 4096
 """Rows that are handed on together."""
 GAPS_KEPT = 12
-"""Of all, the longest."""
+"""Gaps that are told: the longest."""
 
 
 class Gap(NamedTuple):

@@ -17,7 +17,7 @@ from dcdrw_sim.figures.style import BAND, BLACK, COLUMN, WHEELS, for_print, new_
 SCREEN = 10.0
 """Width on a screen [inch]."""
 LETTERS = 15
-"""Of a title's line, in an inch of letters of POINTS."""
+"""Letters of POINTS that an inch of a title's line holds."""
 _FORCE = '#555555'
 
 

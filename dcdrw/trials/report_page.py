@@ -129,7 +129,7 @@ _HEADS = (
     ('source', ''),
 )
 _CLASSES = {0: ' class="text name"', 1: ' class="text"'}
-"""Of the columns that are no figures."""
+"""Classes of the columns that hold text."""
 _UNKNOWN = '–'
 """A column that holds nothing else is left out."""
 

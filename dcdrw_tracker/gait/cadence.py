@@ -38,6 +38,13 @@ class _Beat(NamedTuple):
     """The longest interval within a burst."""
     fixed: bool = False
     """All bursts are of one size, so that one with fewer samples has lost some."""
+    apart_ns: float = 0.0
+    """The longest time from burst to burst, where they are of various sizes."""
+
+    @property
+    def sample_ns(self) -> float:
+        """Mean time from sample to sample."""
+        return self.period_ns / self.size
 
 
 class Cadence:
@@ -50,6 +57,8 @@ class Cadence:
     def __init__(self) -> None:
         self._gaps = self._lost = self._longest_ns = 0
         self._last_ns: int | None = None
+        self._before_ns = 0
+        """From the burst before the last one to that; 0 where that is not known."""
         self._beat: _Beat | None = None
         self.period_ns = 0
         """Mean time from sample to sample; 0 while unknown."""
@@ -71,8 +80,8 @@ class Cadence:
         intervals = self._intervals
         intervals.append(interval)
         if len(intervals) in self._counts:
-            self._beat = beat = _learned(intervals)
-            self.period_ns, self.burst = round(beat.period_ns / beat.size), round(beat.size)
+            self._beat = beat = _learned(intervals, self._beat)
+            self.period_ns, self.burst = round(beat.sample_ns), round(beat.size)
             if len(intervals) == LEARNING_COUNTS[-1]:
                 self._settle()
                 self._counts = LEARNING_COUNTS[-1:]
@@ -81,29 +90,40 @@ class Cadence:
         """Go on from another stamp, without a gap: the source has started anew."""
         self._settle()
         self._intervals.clear()
-        self._last_ns = stamp_ns
+        self._last_ns, self._before_ns = stamp_ns, 0
+
+    def seconds(self, elapsed: float) -> float:
+        """The time in which the source turned on from one sample to the next [s], by that between their stamps.
+
+        Within bursts, which are stamped as they arrive, it is the mean one.
+        """
+        beat = self._beat
+        if beat is None or self.burst == 1 or elapsed * 1e9 > GAP * max(beat.period_ns, beat.apart_ns):
+            return elapsed
+        return beat.sample_ns * 1e-9
 
     def status(self) -> CadenceStatus:
         """A snapshot."""
-        gaps, lost, longest_ns, _ = self._judged()
+        gaps, lost, longest_ns, *_ = self._judged()
         rate = 1e9 * self._beat.size / self._beat.period_ns if self._beat else math.nan
         return CadenceStatus(rate, self._gaps + gaps, self._lost + lost, max(self._longest_ns, longest_ns) * 1e-9)
 
     def _settle(self) -> None:
         """Count the gaps so far for good, and keep the intervals of a burst that may not be complete."""
-        gaps, lost, longest_ns, rest = self._judged()
+        gaps, lost, longest_ns, rest, self._before_ns = self._judged()
         self._gaps += gaps
         self._lost += lost
         self._longest_ns = max(self._longest_ns, longest_ns)
         self._intervals = rest
 
-    def _judged(self) -> tuple[int, int, int, list[int]]:
-        """Gaps, lost samples and the longest gap [ns] among the intervals, and those of the last burst."""
+    def _judged(self) -> tuple[int, int, int, list[int], int]:
+        """Gaps, lost samples, the longest gap [ns], the intervals of the last burst, and the time before it [ns]."""
         beat, intervals = self._beat, self._intervals
         if beat is None:
-            return 0, 0, 0, intervals
+            return 0, 0, 0, intervals, 0
         gaps = lost = longest_ns = 0
-        period, inside, size = beat.period_ns, 0, 1
+        period, inside, size, before = beat.period_ns, 0, 1, self._before_ns
+        various = beat.size > 1.0 and not beat.fixed
         first = 0
         for place, interval in enumerate(intervals):
             if interval <= beat.together_ns:
@@ -111,20 +131,26 @@ class Cadence:
                 size += 1
                 continue
             between = inside + interval
-            if between > GAP * period:
-                gaps += 1
-                lost += max(round(between * beat.size / period - max(size, beat.size)), 1)
-                longest_ns = max(longest_ns, interval)
-            if beat.fixed and place > size and size < beat.size:  # not the first, which may have begun before
-                gaps += between <= GAP * period
-                lost += round(beat.size) - size
-                longest_ns = max(longest_ns, interval)
-            inside, size, first = 0, 1, place + 1
-        return gaps, lost, longest_ns, intervals[first:]
+            if various:  # a burst has what was sampled since the one before
+                if before > (GAP * size + 1.0) * beat.sample_ns:
+                    gaps += 1
+                    lost += max(round(before / beat.sample_ns) - size, 1)
+                    longest_ns = max(longest_ns, before)
+            else:
+                if between > GAP * period:
+                    gaps += 1
+                    lost += max(round(between * beat.size / period - max(size, beat.size)), 1)
+                    longest_ns = max(longest_ns, interval)
+                if beat.fixed and place > size and size < beat.size:  # not the first, which may have begun before
+                    gaps += between <= GAP * period
+                    lost += round(beat.size) - size
+                    longest_ns = max(longest_ns, interval)
+            before, inside, size, first = between, 0, 1, place + 1
+        return gaps, lost, longest_ns, intervals[first:], before
 
 
-def _learned(intervals: list[int]) -> _Beat:
-    """The beat of these intervals."""
+def _learned(intervals: list[int], known: _Beat | None) -> _Beat:
+    """The beat of these intervals; that which was known where they come in bursts that tell none."""
     ordered = sorted(intervals)
     one_by_one = _Beat(median_low(ordered))
     # The widest step between neighbouring lengths parts the intervals within bursts from those between them.
@@ -143,8 +169,26 @@ def _learned(intervals: list[int]) -> _Beat:
     even = [place for place, one in enumerate(periods) if abs(one - usual) < 0.5 * usual]
     size, period = (sum(counts[place] for place in even) / len(even) for counts in (sizes, periods))
     alike = sum(0.5 * size <= one <= 2.0 * size for one in sizes)
-    if size < 1.5 or min(len(even), alike) < 0.7 * len(sizes):
-        return one_by_one
+    regular = size >= 1.5 and min(len(even), alike) >= 0.7 * len(sizes)
     most = median_low(sizes)
-    fixed = len(sizes) >= 8 and sizes.count(most) >= 0.9 * len(sizes)
-    return _Beat(period, most if fixed else size, together, fixed)
+    if regular and len(sizes) >= 8 and sizes.count(most) >= 0.9 * len(sizes):
+        return _Beat(period, most, together, fixed=True)
+    if beat := _uneven(sizes, periods, together):
+        return beat
+    if regular:
+        return _Beat(period, size, together)
+    return known if known and known.size > 1.0 else one_by_one
+
+
+def _uneven(sizes: list[int], periods: list[int], together_ns: int) -> _Beat | None:
+    """The beat of bursts that come as it happens, each with what was sampled since the one before."""
+    shares = [period / size for period, size in zip(periods, sizes[1:], strict=False)]
+    if len(shares) < BURSTS or sum(sizes) < 1.2 * len(sizes):
+        return None
+    usual = median_low(shares)
+    near = [place for place, share in enumerate(shares) if abs(share - usual) <= 0.5 * usual]
+    if len(near) < 0.7 * len(shares):
+        return None
+    sample_ns = sum(periods[place] for place in near) / sum(sizes[place + 1] for place in near)
+    size = sum(sizes) / len(sizes)
+    return _Beat(sample_ns * size, size, together_ns, apart_ns=max(periods[place] for place in near))

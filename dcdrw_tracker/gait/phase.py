@@ -243,7 +243,7 @@ class PhaseEstimator:
         if elapsed_ns > 0:
             # While outliers are held, a sample that could go on from either belongs to the nearer.
             stray = self._held[-1].joints if self._held and self._held[-1].why == 'outlier' else None
-            if stray is None or _distance(joints, last) <= _distance(joints, stray):
+            if stray is None or self._apart(joints, last) <= self._apart(joints, stray):
                 update = self._follow(joints, elapsed_ns * 1e-9)
                 if update:
                     self._arrived_ns = arrival_ns
@@ -483,6 +483,13 @@ class PhaseEstimator:
         """Whether wheels can turn from one sample to the other."""
         reach = self.params.max_speed * (later.stamp_ns - earlier.stamp_ns) * 1e-9 + 4.0 * self._tolerance.hysteresis
         return later.stamp_ns > earlier.stamp_ns and _distance(earlier, later) <= reach
+
+    def _apart(self, one: JointSample, other: JointSample) -> float:
+        """How far apart two samples are: the wheel that differs most, whole turns aside where it is known to wrap."""
+        return max(
+            abs(math.remainder(here.angle - there.angle, math.tau) if wheel.wraps else here.angle - there.angle)
+            for wheel, here, there in ((self._front, one.front, other.front), (self._rear, one.rear, other.rear))
+        )
 
     def _speed(self, turn: Turn) -> float:
         """The source's own speed, where it gives one that a wheel can have."""

@@ -6,15 +6,16 @@ from typing import Any
 from rclpy.node import Node
 from std_msgs.msg import Float64, Int32
 
-from dcdrw_msgs_py.diagnosis import Diagnosis
+from dcdrw_msgs_py.diagnosis import Diagnosis, contested
 from dcdrw_msgs_py.messages import JointSampleReader, PhaseSampleWriter, footfall_message
-from dcdrw_msgs_py.node import Age, Parameters, advertise, follow_runs, listen, publish_diagnosis, run
+from dcdrw_msgs_py.node import Age, Parameters, advertise, follow_runs, listen, publish_diagnosis, publishers, run
 from dcdrw_msgs_py.rig import FRONT
 from dcdrw_msgs_py.samples import LoneWheel
 from dcdrw_msgs_py.topics import FOOTFALLS, JOINT_STATES, PHASE_STATE, PHI, STEP_DIFFERENCE
 from dcdrw_tracker.gait.diagnostics import diagnose_phase
 from dcdrw_tracker.gait.pairing import WheelPairs
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams, PhaseUpdate
+from dcdrw_tracker.gait.rivals import Rivals
 
 STALE_AFTER = 1.0
 """Age of the last accepted sample from which the input is stale [s]."""
@@ -31,6 +32,7 @@ class PhaseEstimatorNode(Node):
         self._reader = JointSampleReader(params.front_joint, params.rear_joint, params.coupler_joint)
         self._joints = params.front_joint, params.rear_joint
         self._pairs = WheelPairs()
+        self._rivals, self._sources = Rivals(self._joints), 1
         self._writer = PhaseSampleWriter()
         self._phase = advertise(self, PHASE_STATE)
         self._phi = advertise(self, PHI)
@@ -43,6 +45,7 @@ class PhaseEstimatorNode(Node):
         self.get_logger().info(f'waiting for the joints {params.front_joint} and {params.rear_joint}')
 
     def _on_joints(self, message: Any) -> None:
+        self._rivals.hear(message.name)
         try:
             read = self._reader.read_any(message)
         except ValueError as error:
@@ -69,6 +72,8 @@ class PhaseEstimatorNode(Node):
     def _publish(self, update: PhaseUpdate) -> None:
         self._age.renew()
         for phase in (*update.held, update.phase):
+            if self._sources > 1:
+                phase = phase._replace(sources=self._sources)
             self._phase.publish(self._writer.write(phase))
         self._phi.publish(Float64(data=update.phase.phi.angle))
         self._step_difference.publish(Int32(data=update.phase.step_difference))
@@ -76,7 +81,10 @@ class PhaseEstimatorNode(Node):
             self._footfalls[footfall.wheel].publish(footfall_message(footfall))
 
     def _diagnose(self) -> Diagnosis:
-        return diagnose_phase(self._estimator.status(), self._age.seconds, STALE_AFTER)
+        rivals = self._rivals.among(publishers(self, JOINT_STATES))
+        self._sources = max(len(rivals), 1)
+        diagnosis = diagnose_phase(self._estimator.status(), self._age.seconds, STALE_AFTER)
+        return contested(diagnosis, JOINT_STATES.name, rivals)
 
 
 def main(args: list[str] | None = None) -> int:

@@ -6,11 +6,12 @@ from typing import Any
 from rclpy.node import Node
 from std_msgs.msg import Bool, Float64
 
-from dcdrw_msgs_py.diagnosis import REFUSED, Diagnosis, PairState
+from dcdrw_msgs_py.diagnosis import REFUSED, Diagnosis, Level, PairState, contested
 from dcdrw_msgs_py.messages import PhaseSampleReader, turns_message
-from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, publish_diagnosis, run, steady_clock
+from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, publish_diagnosis, publishers, run, steady_clock
 from dcdrw_msgs_py.samples import Turn
 from dcdrw_msgs_py.topics import (
+    JOINT_STATES,
     PHASE_JOINT,
     PHASE_STATE,
     SYNC_ERROR,
@@ -40,7 +41,7 @@ class SyncMonitorNode(Node):
         self._synchronized = advertise(self, SYNCHRONIZED)
         self._sync_state = advertise(self, SYNC_STATE)
         self._pitch = self._settings.value.front.alpha + self._settings.value.rear.alpha
-        self._unreadable = 0
+        self._unreadable, self._sources = 0, 1
         self._age = Age()
         self._verdict: bool | None = None
         self._state: PairState | None = None
@@ -60,6 +61,7 @@ class SyncMonitorNode(Node):
             self._unreadable += 1
             return
         self._age.renew()
+        self._sources = phase.sources
         p_rate = phase.phi.rate / self._pitch
         turns = {
             PHASE_JOINT: Turn(0.5 + 0.01 * sync.error_percent, p_rate),
@@ -92,7 +94,12 @@ class SyncMonitorNode(Node):
 
     def _diagnose(self) -> Diagnosis:
         diagnosis = diagnose_sync(self._monitor.status(), self._age.seconds, self._settings.value.stale_after)
-        return diagnosis._replace(values={**diagnosis.values, REFUSED: self._unreadable})
+        diagnosis = diagnosis._replace(values={**diagnosis.values, REFUSED: self._unreadable})
+        if self._sources > 1 and diagnosis.level != Level.STALE:  # by the word of the estimator, who knows the joints
+            nodes = publishers(self, JOINT_STATES)  # unless the estimator's topic was remapped
+            nodes = nodes if len(nodes) > 1 else ['see phase_estimator'] * self._sources
+            return contested(diagnosis, JOINT_STATES.name, nodes)
+        return contested(diagnosis, PHASE_STATE.name, publishers(self, PHASE_STATE))
 
 
 def main(args: list[str] | None = None) -> int:

@@ -12,11 +12,11 @@ from typing import Any
 from rclpy.node import Node
 
 from dcdrw_msgs_py.camera import Camera, read_camera
-from dcdrw_msgs_py.diagnosis import Diagnosis, Level
+from dcdrw_msgs_py.diagnosis import Diagnosis, Level, contested
 from dcdrw_msgs_py.frame import Frame
 from dcdrw_msgs_py.image_messages import camera, compressed_frame, frame, image_message, pose, tag_message
 from dcdrw_msgs_py.messages import JointSampleWriter, run_message
-from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, publish_diagnosis, run, steady_clock
+from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, publish_diagnosis, publishers, run, steady_clock
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND, JointSample
 from dcdrw_msgs_py.tagging import TagParams, mounts
@@ -30,6 +30,7 @@ from dcdrw_msgs_py.topics import (
     REAR_POSE,
     RUNS,
     TAG_DETECTIONS,
+    Topic,
 )
 from dcdrw_tracker.node.debug_image import draw
 from dcdrw_tracker.node.frame_thread import FrameThread, Slot
@@ -75,6 +76,8 @@ class TagTrackerNode(Node):
         self._age = Age()
         self._problem, self._unusable, self._seconds = '', 0, math.nan
         self._said: tuple[Level, str] | None = None
+        self._topics: tuple[Topic, ...] = ()
+        """What only one node should publish."""
         self._counted = 0, 0
         self._slot: Slot[Any] = Slot()
         self._reader: FrameThread | None = None
@@ -82,6 +85,7 @@ class TagTrackerNode(Node):
         if self._source.source == POSES:
             self._angles = WheelAngles(self._track.value, first_run)
             self._pairs = PosePairs(self._bodies, self._track.value.slope)
+            self._topics = (FRONT_POSE, REAR_POSE)
             listen(self, FRONT_POSE, partial(self._on_pose, FRONT))
             listen(self, REAR_POSE, partial(self._on_pose, REAR))
         else:
@@ -121,6 +125,7 @@ class TagTrackerNode(Node):
             if source.image_transport == COMPRESSED:
                 self._read = compressed_frame
                 topic = IMAGE_COMPRESSED._replace(name=f'{self.resolve_topic_name(IMAGE_RAW.name)}/compressed')
+            self._topics = (topic,)
             self._subscription = listen(self, topic, self._slot.put, NEWEST)
             if not source.camera:
                 listen(self, CAMERA_INFO, self._on_camera, NEWEST)
@@ -239,6 +244,9 @@ class TagTrackerNode(Node):
             if self._source.source == POSES
             else diagnose_tags(self._tracker.status(), self._source_status())
         )
+        for topic in self._topics:
+            if len(nodes := publishers(self, topic)) > 1:
+                diagnosis = contested(diagnosis, topic.name, nodes)
         if diagnosis[:2] != self._said:  # one line whenever it changes, not one per frame
             self._said = diagnosis[:2]
             if diagnosis.level == Level.OK:  # rclpy allows one level per line of code

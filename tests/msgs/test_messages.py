@@ -52,7 +52,9 @@ def test_joint_samples_survive(sample):
 counts = st.integers(-1000, 1000)
 
 
-@given(st.builds(PhaseSample, stamps, turns, turns, turns, counts, st.integers(0, 1000), counts, counts))
+@given(
+    st.builds(PhaseSample, stamps, turns, turns, turns, counts, st.integers(0, 1000), counts, counts, st.integers(1, 9))
+)
 def test_phase_samples_survive(sample):
     assert PhaseSampleReader().read(PhaseSampleWriter().write(sample)) == sample
 

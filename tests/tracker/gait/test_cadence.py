@@ -91,3 +91,27 @@ def test_bursts_of_various_sizes_are_no_gaps() -> None:
     status = tick(stamps).status()
     assert status.rate == pytest.approx(200.0, rel=0.1)
     assert status.lost < 0.01 * len(stamps)
+
+
+def flushed(count: int, largest: int, seed: int) -> list[float]:
+    """Stamps [ms] of samples at 200 Hz that arrive together with however many came before, up to `largest`."""
+    random_size, stamps, sample = random.Random(seed), list[float](), 0
+    while sample < count:
+        size = random_size.randint(1, largest)
+        sample += size
+        stamps += [5.0 * sample + 0.02 * place for place in range(size)]
+    return stamps
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(2, 10), st.integers(0, 2**32))
+def test_bursts_of_random_sizes_are_no_gaps(largest: int, seed: int) -> None:
+    status = tick(flushed(3000, largest, seed)).status()
+    assert status.rate == pytest.approx(200.0, rel=0.1)
+    assert status.lost < 30
+
+
+def test_what_is_lost_between_bursts_of_random_sizes_is_counted() -> None:
+    stamps = flushed(3000, 6, 1)
+    status = tick([stamp for stamp in stamps if not 5000.0 < stamp < 6000.0]).status()
+    assert 180 < status.lost < 220

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from dcdrw_msgs_py.diagnosis import STATE, Level, PairState, value_text
+from dcdrw_msgs_py.diagnosis import SOURCES, STATE, Diagnosis, Level, PairState, contested, value_text
 from dcdrw_tracker.gait.cadence import CadenceStatus
 from dcdrw_tracker.gait.diagnostics import diagnose_phase, diagnose_sync, phase_text
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams
@@ -120,3 +120,12 @@ def test_the_estimator_says_why_it_refuses_every_sample() -> None:
     tracking = estimator.status()._replace(accepted=3, refusal=None)
     assert diagnose_phase(tracking, 0.1, 1.0).level == Level.OK
     assert diagnose_phase(tracking, 4.0, 1.0).message == 'stale: no sample for 4.0 s'
+
+
+def test_several_nodes_in_the_place_of_one_are_a_warning_that_names_them() -> None:
+    fine, bad = Diagnosis(Level.OK, 'tracking', {}), Diagnosis(Level.ERROR, 'stalled', {})
+    assert contested(fine, 'joint_states', ['/rig']) == Diagnosis(Level.OK, 'tracking', {SOURCES: ''})
+    told = contested(fine, 'joint_states', ['/rig', '/simulator'])
+    assert (told.level, told.values[SOURCES]) == (Level.WARN, '/rig, /simulator')
+    assert told.message == '2 nodes publish joint_states, where one should: /rig, /simulator; tracking'
+    assert contested(bad, 'joint_states', ['/rig', '/rig']).level == Level.ERROR

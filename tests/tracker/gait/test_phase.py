@@ -530,3 +530,15 @@ def test_a_driver_that_starts_at_zero_again_is_no_counter_that_rolled_over() -> 
     for pause_ns in (0, 2 * SECOND):
         status = run(samples[:half] + shift(back, pause_ns))[2]
         assert (status.rollovers, status.restarts, status.restarted[0].cause) == (0, 1, 'rotation')
+
+
+@pytest.mark.parametrize('start', [0.0, -6.4, 3.0, 100.0])
+def test_degrees_taken_for_radians_are_refused_with_a_hint_and_are_no_rollover(start: float) -> None:
+    scale = math.degrees(1.0)
+    samples = [
+        JointSample(s.stamp_ns, *(Turn(start + scale * (turn.angle + ALPHA), scale * turn.rate) for turn in s[1:3]))
+        for s in walk(10.0).samples()
+    ]
+    phases, falls, status = run(samples)
+    assert (len(phases), falls, status.rollovers, status.restarts) == (1, [], 0, 0)
+    assert status.hints == ('unit',)
