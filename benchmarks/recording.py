@@ -104,13 +104,15 @@ def compare_reading(minutes: float, rounds: int) -> None:
 
 
 def most_memory(*arguments: str) -> float:
-    """Of a command in a process of its own [MB]."""
-    process = subprocess.Popen([sys.executable, '-m', 'dcdrw.cli', *arguments], stdout=subprocess.DEVNULL)
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode:
-        raise SystemExit(f'dcdrw {" ".join(arguments)} ended with status {process.returncode}')
-    return usage.ru_maxrss / 1024.0
+    """The most memory that a command takes in a process of its own [MB]."""
+    # Not by getrusage, which would count what this process had when it made the other.
+    code = (
+        'import sys; from dcdrw.cli import main; status = main(sys.argv[1:]); '
+        'print(open("/proc/self/status").read(), file=sys.stderr); sys.exit(status)'
+    )
+    done = subprocess.run([sys.executable, '-c', code, *arguments], capture_output=True, text=True, check=True)
+    peak = next(line for line in done.stderr.splitlines() if line.startswith('VmHWM'))
+    return int(peak.split()[1]) / 1024.0
 
 
 def compare_lengths(lengths: Sequence[float]) -> None:

@@ -2,11 +2,12 @@
 
 import argparse
 import math
+import sys
 from pathlib import Path
 
 from dcdrw.console import add_json, check_json, positive, tell, tell_where
 from dcdrw.files import add_force, free_folder
-from dcdrw.trials.leg_walk import read_walk, sentences, summarize_walk, write_walk
+from dcdrw.trials.leg_walk import is_complete, read_walk, sentences, summarize_walk, write_walk
 
 _EPILOG = """\
 FILE is a recording with the topics that leg_tracker takes, or a .csv whose columns are named: time [s] or stamp_ns,
@@ -18,7 +19,8 @@ be in deg/s, for no leg turns so fast in rad/s.
 DIR gets summary.json, and
   heel_strikes.csv  each heel strike: leg, stamp_ns, and the stamp known_ns of the reading that made it certain
   phases.csv        stamp_ns; 2π per stride of each leg [rad]; ψ of each half as a wheel [rad]; empty where unknown
-Exit status: 0 done, 2 wrong input.
+Exit status: 0 the heel strikes of every leg are told by all that there is, 1 those of a leg are not, or a part of the
+recording is damaged and left out, 2 wrong input.
 """
 
 
@@ -42,10 +44,12 @@ def run(options: argparse.Namespace) -> int:
     check_json(options)
     if folder and not options.force:
         free_folder(folder)
-    walk = read_walk(options.file, options.rate, options.rig)
+    walk, damage = read_walk(options.file, options.rate, options.rig)
+    for text in damage:
+        print(f'dcdrw legs: {text}', file=sys.stderr)
     summary = summarize_walk(walk)
     tell(options, sentences(summary), summary)
     if folder:
         write_walk(walk, folder, str(options.file), options.force)
         tell_where(options, f'Written: {folder}/')
-    return 0
+    return 0 if is_complete(summary) and not damage else 1

@@ -17,7 +17,7 @@ from dcdrw.trials.analysis import Analysis, analyze
 from dcdrw.trials.expectation import add_expect, expectation_status
 from dcdrw.trials.filmed import TrackedVideo, add_film_arguments, debug_video, joint_batches, quality, write_frames
 from dcdrw.trials.results import result, sample_file, write_results
-from dcdrw.trials.summary import sentence
+from dcdrw.trials.summary import summarize
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_tracker.node.tag_tracker import Tracked
 
@@ -30,8 +30,9 @@ video, as `dcdrw film --drop` writes it, is used by itself. DIR gets summary.jso
 footfalls.csv and a recording (for ros2 bag, dcdrw replay, analyze and report), as from `dcdrw trial`, and
   frames.csv   each frame: stamp_ns; run, ψ and ω of both wheels (SI units, radians) where both were measured; of each
                wheel tags seen, reprojection error, and the hub's place x downhill and y along the slope's normal
-Ctrl-C ends the tracking and keeps what was tracked. Exit status: 0 all was tracked, 1 the video is truncated (what
-came before is kept), 2 wrong input, 130 interrupted.
+Ctrl-C ends the tracking and keeps what was tracked. Exit status: 0 judged by all that was filmed, 1 the verdict
+rests on less or nothing was run (the sentence says why), or the video is truncated (what came before is kept), 2 wrong
+input, 3 it did not end as --expect says, 130 interrupted.
 """
 
 
@@ -105,7 +106,8 @@ def _finish(
     both = f'{told["frames_with_both_wheels"]} of {told["frames"]} frames show both wheels{missing}. {tags}'
     end = 'interrupted' if film.interrupted else film.complaint or 'complete'
     more = {'end': end, 'video': str(film.path), 'tracking': told}
-    tell(options, [sentence(trial), both], result(trial, more))
+    summary = summarize(trial)
+    tell(options, [summary.sentence, both], result(trial, more))
     for line in _warnings(told):
         print(f'dcdrw track: {line}', file=sys.stderr)
     try:
@@ -117,7 +119,8 @@ def _finish(
         print(f'dcdrw track: {film.complaint}; what came before is kept', file=sys.stderr)
     if film.interrupted:
         return interrupted_status(film.interrupted)
-    return 1 if film.complaint else expectation_status(options.expect, [trial.state])
+    whole = summary.complete and not film.complaint
+    return expectation_status(options.expect, [trial.state]) if whole else 1
 
 
 def _warnings(told: dict[str, Any]) -> Iterator[str]:

@@ -94,7 +94,7 @@ function* pieces(points, jumps) {
   let piece = [];
   for (const point of points) {
     const last = piece.at(-1);
-    if (last && (point[0] - last[0] > 0.3 || jumps(point, last))) {
+    if (last && (point[0] - last[0] > 0.3 || point[0] < last[0] || jumps(point, last))) {
       yield piece;
       piece = [];
     }

@@ -86,6 +86,8 @@ def read_command(text: str) -> Command:
         raise ValueError('a command must be an object')
     do, name, value = content.get('do'), content.get('name'), content.get('value')
     if do == 'set' and isinstance(name, str) and name in CONTROLS:
+        if not isinstance(value, (int, float)):
+            raise ValueError(f'{name} must be a number, got {value!r}')
         return Command('set', name, CONTROLS[name].coerce(value))
     if do == 'reset':
         return Command('reset')
@@ -159,8 +161,7 @@ class LiveState:
         """Take a sample of `phase_state`."""
         if self._monitor.update(phase) is None:
             return
-        last = self._phases[-1] if self._phases else None
-        if last is None or phase.restarts != last.restarts or phase.stamp_ns < last.stamp_ns:
+        if self._begins_anew(phase, now):
             self._restart()
         self._phases.append(phase)
         self._phase_at = now
@@ -228,10 +229,18 @@ class LiveState:
             self._board_at, self._told_steps = now, status.steps
         return frame
 
+    def _begins_anew(self, phase: PhaseSample, now: float) -> bool:
+        """Whether the source has started anew, or its clock was set: the stamps jumped, and no such time has passed."""
+        last = self._phases[-1] if self._phases else None
+        if last is None or phase.restarts != last.restarts:
+            return True
+        ahead = (phase.stamp_ns - last.stamp_ns) * 1e-9
+        return ahead < 0.0 or (ahead > STALE_SECONDS and now - self._phase_at < 0.5 * ahead)
+
     def _restart(self) -> None:
-        """The source has started anew: what the charts had is of another run."""
+        """The source has started anew, or its clock was set: what the charts had is of another run."""
         self._run += 1
-        for kept in (self._phases, self._phis, self._falls, self._feet):
+        for kept in (self._phases, self._phis, self._forces, self._falls, self._feet):
             kept.clear()
         self._renew()
 

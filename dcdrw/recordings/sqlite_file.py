@@ -24,6 +24,8 @@ _MOST_COPIES = 5
 _MOST_GAPS = 1000
 """Damaged stretches after which the rest is given up: seconds."""
 _LAST_ID = 2**63 - 1
+_DAMAGED = (sqlite3.Error, UnicodeError, OverflowError, MemoryError)
+"""What sqlite3 raises on damage: a length that no machine has is MemoryError."""
 _LIMIT_LENGTH = 0
 """SQLITE_LIMIT_LENGTH, which Python names from 3.11 on."""
 
@@ -60,7 +62,7 @@ class SqliteFile(BagFile):
         self._connection = sqlite3.connect(uri, uri=True, isolation_level=None, check_same_thread=False)
         try:
             self._open()
-        except (sqlite3.Error, UnicodeError, OverflowError, TypeError) as error:
+        except (*_DAMAGED, TypeError) as error:
             self.close()
             raise ValueError(f'{name} cannot be read: {" ".join(str(error).split())[:200]}') from None
         except BaseException:
@@ -94,7 +96,7 @@ class SqliteFile(BagFile):
         self._names: dict[int, str] = {}
         definitions: dict[str, tuple[str, str]] = {}
         if 'message_definitions' in tables:
-            with suppress(sqlite3.Error, ValueError):
+            with suppress(*_DAMAGED, ValueError):
                 definitions = {
                     str(kind): (str(text), str(form))
                     for kind, form, text in self._query(
@@ -111,9 +113,13 @@ class SqliteFile(BagFile):
             )
         try:
             counts = self._query('SELECT topic_id, count(*), min(timestamp), max(timestamp) FROM messages GROUP BY 1')
+            whole = self._query("SELECT count(*) FROM messages WHERE typeof(timestamp) = 'integer'")
+            if whole != [(sum(row[1] for row in counts),)]:
+                self._damage['time'] = f'{self.name}: a message has no possible time'
+                raise sqlite3.DataError
             self._count([row for row in counts if row[0] in self._names])
             self._orderly = self._is_indexed(sum(row[1] for row in counts))
-        except (sqlite3.Error, TypeError):
+        except (*_DAMAGED, TypeError):
             self._orderly = False
             self._count([(key, 1, log_ns, log_ns) for key, log_ns, _ in self._salvage()])
 
@@ -144,11 +150,14 @@ class SqliteFile(BagFile):
                     f'AND topic_id IN ({keys}) ORDER BY timestamp, id',
                     (start_ns, stop_ns),
                 ):
-                    last = max(last, row[1])
                     self._steps = 0
-                    yield row
+                    if isinstance(row[1], int):
+                        last = max(last, row[1])
+                        yield row
+                    else:
+                        self._damage.setdefault('time', f'{self.name}: a message has no possible time')
                 return
-            except (sqlite3.Error, UnicodeError) as error:
+            except _DAMAGED as error:
                 self._damage.setdefault('order', f'{self.name}: {error}')
         for key, log_ns, data in self._salvage():
             if key in wanted and last < log_ns < stop_ns:
@@ -202,7 +211,7 @@ class SqliteFile(BagFile):
             return self._query(
                 'SELECT id, topic_id, timestamp, data FROM messages WHERE id >= ? ORDER BY id LIMIT ?', (number, count)
             )
-        except (sqlite3.Error, UnicodeError):
+        except _DAMAGED:
             return None
 
     def _query(self, text: str, values: tuple[Any, ...] = ()) -> list[Any]:

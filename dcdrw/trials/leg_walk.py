@@ -26,8 +26,8 @@ class WalkParams(NamedTuple):
     legs: LegParams = LegParams()
 
 
-def read_walk(path: Path, rate: float = math.nan, rig: Path | None = None) -> Walk:
-    """Follow the legs in a CSV file, or in a recording of their sensors.
+def read_walk(path: Path, rate: float = math.nan, rig: Path | None = None) -> tuple[Walk, list[str]]:
+    """Follow the legs in a CSV file, or in a recording of their sensors; tells what of it is damaged, and left out.
 
     Args:
         path: the file, or the recording.
@@ -41,11 +41,12 @@ def read_walk(path: Path, rate: float = math.nan, rig: Path | None = None) -> Wa
     """
     if path.suffix.lower() == '.csv':
         params = read_parameter_file(rig, WalkParams()) if rig else WalkParams()
-        return follow(read_legs(path, rate).readings, params.legs)
+        return follow(read_legs(path, rate).readings, params.legs), []
     with Recording(path) as recording:
         if not leg_topics(recording):
             raise ValueError(f'{path} has no topic of a sensor on a leg, as front/left_imu')
-        return follow_recording(recording, rig)
+        walk = follow_recording(recording, rig)
+        return walk, recording.damage
 
 
 def follow_recording(recording: Recording, rig: Path | None = None) -> Walk:
@@ -74,6 +75,11 @@ def _summarize(walk: Walk, leg: Leg) -> dict[str, Any]:
         'gaps': status.gaps,
         'mounting_known': status.mounted,
     }
+
+
+def is_complete(summary: dict[str, dict[str, Any]]) -> bool:
+    """Whether the heel strikes of every leg could be told."""
+    return all(one['mounting_known'] and one['strikes'] for one in summary.values())
 
 
 def sentences(summary: dict[str, dict[str, Any]]) -> list[str]:

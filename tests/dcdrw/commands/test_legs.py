@@ -25,6 +25,14 @@ def test_the_stride_on_the_treadmill_is_what_the_force_plate_tells(capsys):
     assert capsys.readouterr().out == 'front_left (wrench): 46 heel strikes, stride 1.201 ± 0.021 s\n'
 
 
+def test_a_leg_that_cannot_be_told_is_no_success(tmp_path, capsys):
+    axes = [f'left_{kind}_{axis}' for kind in ('acc', 'gyr') for axis in 'xyz']
+    rows = [f'{k / 100},0,0,9.81,0,0,0' for k in range(300)]
+    (tmp_path / 'still.csv').write_text('\n'.join([','.join(['time', *axes]), *rows]))
+    assert main(['legs', str(tmp_path / 'still.csv')]) == 1
+    assert 'its mounting is not known' in capsys.readouterr().out
+
+
 def test_wrong_input_says_what_to_do(tmp_path, capsys):
     assert main(['legs', str(DATA / 'imu_sample.csv')]) == 2
     assert '--rate' in capsys.readouterr().err

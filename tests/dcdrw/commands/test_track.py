@@ -15,6 +15,7 @@ import pytest
 
 from dcdrw.cli import main
 from dcdrw_msgs_py.camera import read_camera, write_camera
+from dcdrw_msgs_py.samples import SECOND
 from tests import ROOT
 
 pytestmark = pytest.mark.processes
@@ -191,6 +192,14 @@ def test_interrupting_keeps_what_was_tracked(film, tmp_path):
     assert 'Written: out/' in said
     assert json.loads((tmp_path / 'out' / 'summary.json').read_text())['end'] == 'interrupted'
     assert 10 < len(rows(tmp_path / 'out' / 'frames.csv')) < 8 * len(images)
+
+
+def test_a_verdict_that_rests_on_a_part_of_the_film_is_no_success(film, tmp_path, capsys):
+    late = [k * SECOND // 30 + (5 * SECOND if k >= 60 else 0) for k in range(SECONDS * 30)]
+    (tmp_path / 'stamps.csv').write_text('\n'.join(['stamp_ns', *map(str, late)]))
+    assert track(film, tmp_path / 'out', '--stamps', str(tmp_path / 'stamps.csv')) == 1
+    assert 'No sample of use came for 5.0 s' in capsys.readouterr().out
+    assert json.loads((tmp_path / 'out' / 'summary.json').read_text())['complete'] is False
 
 
 def test_a_truncated_video_is_told_and_what_came_before_is_kept(film, tmp_path, capsys):

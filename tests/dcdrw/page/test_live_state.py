@@ -28,7 +28,7 @@ from dcdrw_msgs_py.diagnosis import (
 from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_msgs_py.samples import CouplerSample, Footfall, JointSample, PhaseSample, Turn
 from dcdrw_sim.rig.simulator import SimulatedRig
-from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseUpdate
+from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams, PhaseUpdate
 
 START_NS = 1_700_000_000_000_000_000
 UNEQUAL = RigParams(
@@ -225,6 +225,42 @@ def test_restart_of_the_source_clears_the_charts():
     assert frame['board']['steps'] == 0
     state.take_phase(update.phase._replace(restarts=1, stamp_ns=START_NS), 2.6)  # a recording that is played again
     assert state.frame(2.6)['run'] == 3
+
+
+@pytest.mark.parametrize('seconds', [37.0, -3600.0, 1e9])
+def test_a_clock_that_was_set_begins_clean_charts(seconds):
+    """Stamps jump while the wheels roll on, and time goes on: state and age as ever, one run after the other."""
+    state, step_ns = LiveState(TrialParams.of_rig(RigParams(k=60.0))), round(seconds * 1e9)
+    estimator = PhaseEstimator(PhaseParams())
+    frames = []
+    for now, joints, _ in walk(RigParams(k=60.0), 8.0):
+        set_joints = joints._replace(stamp_ns=joints.stamp_ns + (step_ns if now >= 4.0 else 0))
+        state.take_joints(set_joints, now)
+        update = estimator.update(set_joints, 0, round(now * 1e9))
+        for phase in (*update.held, update.phase) if update else ():
+            state.take_phase(phase, now)
+        for fall in update.footfalls if update else ():
+            state.take_footfall(fall)
+        if not round(now * 500) % 20:
+            frames.append(state.frame(now))
+    assert [frame['run'] for frame in frames] == sorted(frame['run'] for frame in frames)
+    assert frames[-1]['run'] == 2
+    later = [frame for frame in frames if frame['run'] == 2]
+    assert all(frame['state'] not in (LATE_DATA, PairState.NO_DATA.value) and frame['age'] < 0.5 for frame in frames)
+    for name in ('phis', 'forces'):
+        times = [point[0] for frame in later for point in frame.get(name, [])]
+        assert times == sorted(times)
+        assert times[-1] - times[0] < 4.1
+    boards = [frame['board'] for frame in later if 'board' in frame]
+    assert 0 < boards[-1]['steps'] <= 8  # counted from where the clock was set
+
+
+def test_a_silence_is_a_gap_in_the_charts():
+    state = LiveState(TrialParams())
+    for now, joints, update in walk(RigParams(), 4.0):
+        if not 1.0 < now < 3.0:
+            show(state, now, joints, update)
+    assert state.frame(4.0)['run'] == 1
 
 
 def test_node_that_falls_silent_is_stale_and_its_controls_are_off():

@@ -4,6 +4,7 @@ import re
 import shutil
 import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -472,3 +473,21 @@ def test_two_suites_are_told_apart_by_their_namespace(tmp_path):
             assert recording.find('joint_states', namespace=space) == '/rig_2/joint_states'
         with pytest.raises(ValueError, match='no topic joint_states of sensor_msgs/msg/JointState in rig_3'):
             recording.find('joint_states', namespace='rig_3')
+
+
+@pytest.mark.parametrize('time', ['NULL', "'noon'", "x'00ff'", '1.5', '9e99'])
+def test_rows_of_sqlite_without_a_possible_time_cost_themselves_alone(tmp_path, time):
+    bag = write_bag(
+        tmp_path / 'bag',
+        [(10**18 + k * 10**7, joint_state(10**18 + k * 10**7, ['front_wheel'], [k / 50])) for k in range(20)],
+        storage=StoragePlugin.SQLITE3,
+    )
+    with closing(sqlite3.connect(next(bag.glob('*.db3')))) as connection, connection:
+        connection.execute('CREATE TABLE loose AS SELECT * FROM messages')
+        connection.execute('DROP TABLE messages')
+        connection.execute('ALTER TABLE loose RENAME TO messages')
+        connection.execute(f'UPDATE messages SET timestamp = {time} WHERE rowid = 7')
+    with Recording(bag) as recording:
+        times = [message.log_ns for message in recording.messages(['/joint_states'])]
+        assert times == [10**18 + k * 10**7 for k in range(20) if k != 6]
+        assert recording.damage
