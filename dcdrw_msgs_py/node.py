@@ -188,13 +188,14 @@ class Inbox:
 
     A subscriber that cannot keep up would hear ever older messages, up to the depth of its queue. Once messages have
     been older than OLD for longer than that, all that wait are dropped and counted, down to the newest ones. A short
-    stall, or a burst, loses nothing.
+    stall, or a burst, loses nothing. Where dropping alone takes longer than messages take to come, one is passed on
+    every OLD seconds all the same, so that the subscriber does not take its input for silent.
     """
 
     def __init__(self, callback: Callable[[Any], None]) -> None:
         self._callback = callback
         self._behind_since = math.inf
-        self._dropping = False
+        self._dropping, self._passed_at = False, 0.0
         self.dropped = 0
         """Messages that were dropped so far."""
 
@@ -209,11 +210,13 @@ class Inbox:
             now = time.monotonic()
             self._behind_since = min(self._behind_since, now)
             if now - self._behind_since > OLD:
-                self._dropping, self._behind_since = True, math.inf
-        if self._dropping:
+                self._dropping, self._behind_since, self._passed_at = True, math.inf, now
+        if self._dropping and time.monotonic() - self._passed_at <= OLD:
             self.dropped += 1
-        else:
-            self._callback(message)
+            return
+        self._callback(message)
+        if self._dropping:
+            self._passed_at = time.monotonic()
 
 
 def listen(node: Node, topic: Topic, callback: Callable[[Any], None], depth: int = SAMPLE_DEPTH) -> Any:

@@ -132,6 +132,8 @@ def _judge_phase(status: PhaseStatus, age: float, stale_after: float) -> tuple[L
 HINTS: dict[Hint, str] = {
     'front_sign': 'the front wheel rolls uphill: is its sign right? (parameter front_sign)',
     'rear_sign': 'the rear wheel rolls uphill: is its sign right? (parameter rear_sign)',
+    'rollover': "an encoder's counter rolls over within a turn, perhaps also before the start: where is its zero? "
+    '(parameter rollover, which takes a start in its upper half for one below 0)',
     'unit': 'the wheels turn faster than they can roll: are their rotations in degrees? (parameter unit)',
 }
 """What makes a parameter seem wrong."""

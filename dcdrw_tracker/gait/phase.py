@@ -23,7 +23,7 @@ is not a number, the stamp stands still, goes back or lies ahead of the clock, o
 Cause = Literal['announced', 'stamp', 'rotation']
 """Why the source is taken to have started anew: it says so, its stamps went back, or its rotations jumped."""
 
-Hint = Literal['front_sign', 'rear_sign', 'unit']
+Hint = Literal['front_sign', 'rear_sign', 'unit', 'rollover']
 """A parameter that is probably set wrongly, judged by how the wheels seem to turn."""
 
 LARGEST_ROTATION = 1e9
@@ -71,7 +71,7 @@ class PhaseParams(NamedTuple):
             'by how much a rotation jumps where the counter of its encoder rolls over',
             'rad',
             above=0.0,
-            derived='whole turns, and 2¹⁶ counts, are recognized',
+            derived='whole turns, and powers of two of counts, are recognized',
             live=True,
         ),
     ] = math.nan
@@ -285,6 +285,8 @@ class PhaseEstimator:
             hints.append('front_sign')
         if self._rear.steps <= -UPHILL_STEPS:
             hints.append('rear_sign')
+        if not (self._front.is_zero_known and self._rear.is_zero_known):
+            hints.append('rollover')
         return tuple(hints)
 
     def _is_unstamped(self, joints: JointSample) -> bool:

@@ -16,8 +16,8 @@ LEAST_COUNT = 1e-6
 """A finer encoder is none: rotations that are no multiples of a count [rad]."""
 LEARNING = 500
 """Samples of a moving wheel from which the count is learned."""
-COUNTER = 2**16
-"""Counts after which the usual counter of an encoder rolls over."""
+FEWEST_BITS = 10
+"""No counter of an encoder rolls over after fewer counts than two to this power."""
 
 
 class Tolerance(NamedTuple):
@@ -52,7 +52,12 @@ class Rotation:
     def __init__(self, alpha: float, stamp_ns: int, angle: float, rate: float, tolerance: Tolerance) -> None:
         self.alpha = alpha
         self.pitch = 2.0 * alpha
-        self.psi = angle
+        self._raw = self._first = angle
+        # A counter that counts up from 0 has rolled back over it where it stands in its upper half.
+        width = tolerance.rollover
+        self._offset = 0.0 if math.isnan(width) else -width * round(angle / width)
+        """What the source has lost in whole turns, or as its counter rolled over: ψ minus the raw angle [rad]."""
+        self.psi = angle = angle + self._offset
         """ψ, continuous [rad]."""
         self.rate = rate
         """ψ̇ [rad/s]; NaN where it is not known yet."""
@@ -62,15 +67,14 @@ class Rotation:
         """The fastest that the wheel has turned of late [rad/s]."""
         self._highest = math.nextafter(alpha, 0.0)
         self._stamp_ns = stamp_ns
-        self._raw = angle
-        self._offset = 0.0
-        """What the source has lost in whole turns, or as its counter rolled over: ψ minus the raw angle [rad]."""
         self._unlearned = LEARNING
         self._count = math.inf
         """Angle of one count of the source's encoder; infinite before the wheel has turned, 0 where there is none."""
         self.rollovers = 0
         """How often the source's counter has rolled over."""
-        self._wraps: bool | None = False if abs(angle) > math.tau + self.pitch else None
+        self.is_zero_known = True
+        """False where the counter may have rolled over before the start, so that it is not known where ψ is 0."""
+        self._wraps: bool | None = False if abs(self._raw) > math.tau + self.pitch else None
         self._past = deque([(stamp_ns, angle)])
         self._since_strike = 1
         self._cell = self._first_cell = int(stance(alpha, angle + 0.5 * tolerance.hysteresis)[0])
@@ -129,14 +133,15 @@ class Rotation:
         against = min(fastest, self.pitch) + slack
         low, high = (-against, along) if self.pace >= 0.0 else (-along, against)
         lost = 0.0
-        if self._wraps or (self._wraps is None and not low <= moved <= high and not self.may_step(dt)):
+        told = not math.isnan(tolerance.rollover)
+        if self._wraps or (self._wraps is None and not told and not low <= moved <= high and not self.may_step(dt)):
             lost = -math.tau * round((moved - self.pace * dt) / math.tau)
         if not low <= moved + lost <= high:
             lost = 0.0 if self.may_step(dt) else self._rolled_over(angle, dt, tolerance)
         return angle + (self._offset + lost) if low <= moved + lost <= high else None
 
     def _rolled_over(self, angle: float, dt: float, tolerance: Tolerance) -> float:
-        """What a counter has lost that rolled over: whole turns, 2¹⁶ counts, or all from one end to the other; or 0.
+        """What a counter has lost that rolled over: whole turns, 2ᵏ counts, or all from one end to the other; or 0.
 
         A counter that rolls over jumps against the motion, and goes on where the motion takes it.
         """
@@ -145,13 +150,19 @@ class Rotation:
         if jump * along >= 0.0:
             return 0.0
         slack = 2.0 * tolerance.hysteresis + 0.5 * abs(along)
-        widths = math.tau * round(abs(jump) / math.tau), COUNTER * self._count
+        widths = math.tau * round(abs(jump) / math.tau), self._counter(abs(jump))
         for width in widths if math.isnan(tolerance.rollover) else (tolerance.rollover,):
             if width and abs(abs(jump) - width) <= slack:
                 return math.copysign(width, -jump)
         if abs(jump) > math.tau and abs(angle + self._raw) <= slack:
             return -jump
         return 0.0
+
+    def _counter(self, jump: float) -> float:
+        """How far a counter of 2ᵏ counts reaches that may have jumped so far [rad]; 0 where there is none."""
+        counts = jump / self._count if self._count else 0.0
+        bits = round(math.log2(counts)) if counts >= 1.0 else 0
+        return self._count * 2.0**bits if bits >= FEWEST_BITS else 0.0
 
     def advance(
         self, stamp_ns: int, angle: float, psi: float, rate: float, tolerance: Tolerance, burst: int = 1
@@ -168,7 +179,11 @@ class Rotation:
         if abs(lost) > math.pi:
             within = max(abs(angle), abs(self._raw)) <= math.tau + self.pitch
             self._wraps = within and abs(lost) < 1.5 * math.tau
-            self.rollovers += not self._wraps
+            if not self._wraps:
+                self.rollovers += 1
+                steps = lost / self.pitch
+                if math.isnan(tolerance.rollover) and abs(steps - round(steps)) > 1e-3:
+                    self.is_zero_known &= abs(self._first) <= 0.5 * abs(lost)
             turns = round((psi - angle) / math.tau)
             whole = abs(psi - angle - turns * math.tau) < 1e-6
             self._offset = math.tau * turns if whole else psi - angle

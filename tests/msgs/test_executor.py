@@ -3,6 +3,7 @@
 import os
 import time
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 
 import pytest
 import rclpy
@@ -132,6 +133,17 @@ def test_a_reader_three_times_too_slow_hears_no_old_messages_and_counts_what_it_
     assert inbox.dropped + len(ages) == len(arrivals)
     assert max(ages) < 3 * OLD
     assert 0.2 * len(arrivals) < len(ages) < 0.4 * len(arrivals)
+
+
+def test_a_reader_that_cannot_even_drop_what_comes_still_hears_something(monkeypatch):
+    clock, heard = Clock(), []
+    monkeypatch.setattr(nodes, 'time', clock)
+    inbox = Inbox(lambda arrival: heard.append(clock.now))
+    for k in range(5000):
+        inbox(None, {'received_timestamp': round((1000.0 + 0.001 * k) * 1e9)})
+        clock.now += 0.002  # twice as long as from one to the next
+    assert inbox.dropped + len(heard) == 5000
+    assert max(later - earlier for earlier, later in pairwise(heard)) < 2 * OLD
 
 
 def test_a_stall_or_a_burst_that_the_reader_catches_up_with_loses_nothing(monkeypatch):

@@ -515,7 +515,8 @@ def test_a_counter_that_rolls_over_loses_nothing(
     zero = low + width - round(1.3 * per_turn)  # each wheel rolls over after some turns
     params = PhaseParams(rollover=width / per_turn * math.tau) if rollover else PARAMS
     phases, falls, status = run(counted(samples, per_turn, low, width, zero), params)
-    plain, plain_falls, _ = run(counted(samples, per_turn, -(2**40), 2**41, zero))
+    below = width if rollover else 0  # told, a start in the upper half of the counter is one below 0
+    plain, plain_falls, _ = run(counted(samples, per_turn, -(2**40), 2**41, zero - below))
     assert status.rollovers == 2
     assert (status.restarts, status.refusals, status.n_uncertain) == (0, {}, False)
     assert [phase.phi.angle for phase in phases] == pytest.approx([p.phi.angle for p in plain], abs=1e-2)
@@ -542,3 +543,16 @@ def test_degrees_taken_for_radians_are_refused_with_a_hint_and_are_no_rollover(s
     phases, falls, status = run(samples)
     assert (len(phases), falls, status.rollovers, status.restarts) == (1, [], 0, 0)
     assert status.hints == ('unit',)
+
+
+@pytest.mark.parametrize(('per_turn', 'bits'), [(2000, 12), (2000, 16), (10_000, 14)])
+def test_where_the_zero_of_a_counter_is_not_known_a_hint_asks_and_the_parameter_tells(per_turn: int, bits: int) -> None:
+    """The front wheel starts at −15°, so that its unsigned counter starts near its top."""
+    samples = walk(8.0).samples()
+    unsigned = counted(samples, per_turn, 0, 2**bits)
+    assert run(unsigned)[2].hints == ('rollover',)
+    phases, falls, status = run(unsigned, PhaseParams(rollover=2**bits / per_turn * math.tau))
+    plain, plain_falls, _ = run(counted(samples, per_turn, -(2**40), 2**41))
+    assert status.hints == ()
+    assert [phase.phi.angle for phase in phases] == pytest.approx([p.phi.angle for p in plain], abs=1e-2)
+    assert falls == plain_falls
