@@ -15,6 +15,10 @@ from tests.trials import STIFF
 settings.register_profile('patient', deadline=None)
 settings.load_profile('patient')
 
+# A process that a test kills leaves its locks and segments in Fast DDS's shared memory; a later participant of that
+# domain can lose messages to them, and was seen to crash in SharedMemChannelResource::release when it ended.
+os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
+
 
 @pytest.fixture
 def bench(tmp_path: Path) -> Iterator[Bench]:

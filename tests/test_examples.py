@@ -31,7 +31,10 @@ def test_the_controllers_force_follows_the_error_within_its_limit(bench):
     environment = {**ENVIRONMENT, 'ROS_DOMAIN_ID': str(bench.domain)}
     process = subprocess.Popen([sys.executable, ROOT / 'examples' / 'phase_controller.py'], env=environment)
     bench.processes.append(process)
-    bench.wait(lambda: errors and len(commands) > 100, 'commands')
+
+    def answered():
+        answers = {max(-20.0, min(20.0, 1.5 * error.data)) for error in errors}
+        return len(answers & {command.data for command in commands}) > 50
+
+    bench.wait(answered, 'fifty answers')
     assert {abs(command.data) <= 20.0 for command in commands} == {True}
-    answers = {max(-20.0, min(20.0, 1.5 * error.data)) for error in errors}
-    assert len(answers & {command.data for command in commands}) > 50
