@@ -21,7 +21,7 @@ import numpy as np
 import zstandard
 from rosbags.rosbag2 import StoragePlugin
 
-from dcdrw.commands.design import read_parts
+from dcdrw.parts_list import read_parts
 from dcdrw.recordings.recorder import Recorder, offered_qos
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file

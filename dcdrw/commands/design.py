@@ -2,23 +2,22 @@
 
 import argparse
 import math
-from collections.abc import Iterator
-from itertools import product, zip_longest
+from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 from dcdrw.console import Bar, add_json, check_json, positive, tell, tell_where
 from dcdrw.drawings.design_card import draw_card
 from dcdrw.drawings.figure_files import add_formats, figure_files, write_figure
-from dcdrw.files import add_force, refuse_existing, to_json, write_text
+from dcdrw.files import add_force, refuse_existing, to_json, write_csv, write_text
+from dcdrw.pairs_table import COLUMNS, load_record, pair_lines, pair_records, working
+from dcdrw.parts_list import PartsList, read_parts
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params
 from dcdrw.trials.monitored import monitored
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import RigParams
-from dcdrw_msgs_py.text_file import read_rows
-from dcdrw_sim.figures.style import new_figure
+from dcdrw_sim.figures.style import for_print, new_figure
 from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.model.start import start
 from dcdrw_sim.study.design import (
@@ -33,11 +32,12 @@ from dcdrw_sim.study.design import (
     Task,
     Variation,
     assess,
-    forgiving_order,
     mesh,
     score,
     search,
 )
+from dcdrw_sim.study.loads import preload
+from dcdrw_sim.study.parts import DASHPOT, SPRING, Pair, Part, rank
 from dcdrw_sim.study.sweep import default_seconds
 from dcdrw_sim.study.verdict import Verdict
 from dcdrw_tracker.gait.sync import SyncParams
@@ -45,8 +45,12 @@ from dcdrw_tracker.gait.sync import SyncParams
 STIFFNESS = 1e-4, 1.0
 """What is searched by default, without dimensions."""
 DAMPING = 1e-2, 1e2
-MOST_PARTS = 20_000
-"""Pairs of parts that are judged in minutes."""
+NEAR = 0.2
+"""A slope that is gentler than the rig's by less than this part is near: a level, or a floor, may be off by so much."""
+SLOPE_SHOWN = math.radians(0.05)
+"""Two slopes nearer than this are told as one."""
+LEAST_PRELOAD = 0.05
+"""Of a spring [N]: less is none."""
 AFTERWARDS = 30.0
 """The monitor sees so much more of a motion than it takes to come into step, in √(ℓ/g)."""
 FASTEST, FORGIVING, GIVEN = 'fastest', 'most forgiving', 'given'
@@ -60,27 +64,21 @@ core has seen it come into step from each start.
 The fastest coupler needs fewest steps. The most forgiving needs fewest where k and b are each off by the tolerance
 either way and the slope is a tenth gentler than thought: where parts are bought by their data sheets, take this one.
 
---available takes a table with a header: kind,value,name, a row for each part; kind is spring (value in N/m) or dashpot
-(value in N·s/m); name may be left out. Every pair of them is judged, in the place of the search.
+--available takes a table with a heading, kind,value,name, and a row for each part, separated by commas, semicolons or
+tabs (config/parts.csv shows one). Kind is spring or dashpot, or damper; units stand in the heading (value [N/mm]) or in
+the cell (0.1 N·s/mm), else they are N/m and N·s/m. Where it has columns max_force, max_stroke and max_speed, no pair is
+recommended that asks for more of a part. Every pair is judged, in the place of the search, and those that come into
+step are listed, the best first; --out writes all of them to pairs.csv.
 
 examples:
   dcdrw design                                            for the paper's rig
   dcdrw design --mass 12 --length 0.9 --slope-deg 2.5 --out design
-  dcdrw design --available parts.csv --out design         the best pair among those on sale
+  dcdrw design --available parts.csv --out design         the best pairs among those on sale
   dcdrw design --k 5.25 --b 100                           judge a coupler beside the best ones
 """
 
 
 Steps = tuple[int | None, ...]
-
-
-class Part(NamedTuple):
-    """A spring or a dashpot on sale."""
-
-    kind: str
-    value: float
-    """[N/m] or [N·s/m]"""
-    name: str
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -125,33 +123,45 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f'--band must be below 50 %, got {options.band:g}')
     task = _task(options)
     tolerance = options.tolerance / 100.0
-    parts = read_parts(options.available) if options.available else []
+    offer = read_parts(options.available) if options.available else PartsList()
+    parts = offer.parts
     check_json(options)
     if options.out:
         new_figure(1, 1, 'a card')
         files = figure_files(options.out, ['card'], options.formats)
-        refuse_existing([options.out / 'design.json', *files], options.force)
+        tables = [options.out / 'pairs.csv'] if parts else []
+        refuse_existing([options.out / 'design.json', *tables, *files], options.force)
+    ranked: list[Pair] = []
     with Bar('judging', 'couplers') as bar:
         k, b = _bounds(options, task.rig)
         if parts:
             bar.begin(GRID**2)
             grid = score(task, *mesh(k, b), report=bar.more)
-            pairs = _best_parts(task, parts, tolerance, bar)
+            bar.begin((CASES + 1) * offer.pairs)
+            ranked = rank(task, parts, tolerance, bar.more)
+            best = list(_best(ranked))
         else:
             bar.begin(WORK)
-            grid, *pairs = search(task, k, b, tolerance, bar.more)
-    chosen = {name: assess(task, *pair, tolerance) for name, pair in zip((FASTEST, FORGIVING), pairs, strict=True)}
+            grid, *best = search(task, k, b, tolerance, bar.more)
+    chosen = {name: assess(task, *pair, tolerance) for name, pair in zip((FASTEST, FORGIVING), best, strict=True)}
     if options.k:
         chosen[GIVEN] = assess(task, options.k, options.b, tolerance)
     seen = {name: by_monitor(task, found) for name, found in chosen.items()}
     found = json_record(task, chosen, seen, parts, tolerance)
-    tell(options, summary_lines(task, chosen, seen, parts, tolerance), found)
+    if parts:
+        found |= {'pairs': pair_records(ranked), 'skipped': list(offer.skipped)}
+    lines = chain(summary_lines(task, chosen, seen, parts, tolerance), _offer_lines(ranked, offer, len(task.phases)))
+    tell(options, lines, found)
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
         write_text(options.out / 'design.json', to_json(found), options.force)
+        for path in tables:
+            write_csv(path, COLUMNS, map(dict.values, pair_records(ranked)), options.force)
         texts = _texts(task, chosen, parts, tolerance)
-        on_sale = {kind: [part.value for part in _of(parts, kind)] for kind in ('spring', 'dashpot')}
-        card = draw_card(_rig_line(task), texts, task, grid, chosen, on_sale)
+        on_sale = {kind: [part.value for part in parts if part.kind == kind] for kind in (SPRING, DASHPOT)}
+        large = {name: _sentence(warnings(task, found)) for name, found in chosen.items()}
+        with for_print():
+            card = draw_card(_rig_line(task), texts, large, task, grid, chosen, on_sale)
         write_figure(card, options.out, 'card', options.formats, options.force)
         tell_where(options, f'\nThe card and all numbers are in {options.out}.')
     return 0
@@ -172,42 +182,6 @@ def recommended(found: Assessment, seen: Steps) -> bool:
     return found.verdict is Verdict.IN_STEP and seen == found.steps
 
 
-def read_parts(path: Path) -> list[Part]:
-    """Read a table of parts.
-
-    Raises:
-        ValueError: it is none, has a row that makes no sense, or lacks springs or dashpots.
-        OSError: it cannot be read.
-
-    """
-    rows = read_rows(path)
-    _, names = next(rows, (0, []))
-    if not {'kind', 'value'} <= set(names):
-        raise ValueError(f'{path} must begin with the header kind,value,name, got {",".join(names)[:80]!r}')
-    parts = [_part(dict(zip_longest(names, row[: len(names)])), f'{path}, line {line}') for line, row in rows]
-    for kind in ('spring', 'dashpot'):
-        if not any(part.kind == kind for part in parts):
-            raise ValueError(f'{path} has no {kind}')
-    if len(_of(parts, 'spring')) * len(_of(parts, 'dashpot')) > MOST_PARTS:
-        raise ValueError(f'{path} makes more than {MOST_PARTS} pairs: leave out what is out of the question')
-    return parts
-
-
-def _part(row: dict[str, Any], place: str) -> Part:
-    kind = (row['kind'] or '').strip().lower()
-    if kind not in ('spring', 'dashpot'):
-        raise ValueError(f'{place}: kind must be spring or dashpot, got {row["kind"]!r}')
-    try:
-        value = positive((row['value'] or '').strip())
-    except argparse.ArgumentTypeError as error:
-        raise ValueError(f'{place}: value {error}') from None
-    return Part(kind, value, (row.get('name') or '').strip())
-
-
-def _of(parts: list[Part], kind: str) -> list[Part]:
-    return [part for part in parts if part.kind == kind]
-
-
 def _task(options: argparse.Namespace) -> Task:
     rig = chosen_params(options).rig
     return Task(rig, default_seconds(rig), options.band)
@@ -223,26 +197,26 @@ def _bounds(options: argparse.Namespace, rig: RigParams) -> Iterator[tuple[float
         yield low, high
 
 
-def _best_parts(task: Task, parts: list[Part], tolerance: float, bar: Bar) -> list[tuple[float, float]]:
-    ks, bs = (
-        np.array(column)
-        for column in zip(
-            *product((part.value for part in _of(parts, 'spring')), (part.value for part in _of(parts, 'dashpot'))),
-            strict=True,
-        )
-    )
-    bar.begin(len(ks))
-    first = score(task, ks, bs, report=bar.more).order()[0]
-    bar.begin(len(ks) * CASES)
-    near = forgiving_order(task, ks, bs, tolerance, bar.more)[0]
-    return [(float(ks[index]), float(bs[index])) for index in (first, near)]
+def _best(pairs: list[Pair]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """k and b of the fastest and of the most forgiving pair, among those that work where any does."""
+    good = working(pairs) or pairs
+    fastest, forgiving = good[0], min(good, key=lambda pair: pair.rank_if_off)
+    return (fastest.spring.value, fastest.dashpot.value), (forgiving.spring.value, forgiving.dashpot.value)
+
+
+def _offer_lines(ranked: list[Pair], offer: PartsList, starts: int) -> Iterator[str]:
+    if ranked:
+        yield ''
+        yield from pair_lines(ranked, starts)
+    for reason in offer.skipped:
+        yield f'skipped, {reason}'
 
 
 def summary_lines(
     task: Task,
     chosen: dict[str, Assessment],
     seen: dict[str, Steps],
-    parts: list[Part],
+    parts: Sequence[Part],
     tolerance: float,
 ) -> Iterator[str]:
     """Lines for a person; `seen` is what the monitor says of each."""
@@ -284,14 +258,14 @@ def told(task: Task, found: Assessment, tolerance: float) -> Iterator[tuple[str,
                 f'the damper takes {found.damper_loss:.2f} J/m'
             ),
         )
+    yield from _bought(task, found)
     yield 'margins', '; '.join(f'{name} {_margin(margin)}' for name, margin in found.margins.items())
     slope = found.margins['slope']
     yield (
         'gentlest slope',
-        (
-            f'{math.degrees(slope.low * task.rig.slope):.2f}°'
-            + (f'; on a gentler one: {slope.low_verdict.meaning}' if slope.low_verdict else '')
-        ),
+        f'{math.degrees(slope.low * task.rig.slope):.2f}°'
+        + (f'; on a gentler one: {slope.low_verdict.meaning}' if slope.low_verdict else '')
+        + ('' if math.isnan(found.stall_slope) else f'; stalls at {math.degrees(found.stall_slope):.2f}° and below'),
     )
     off = f'{100 * tolerance:.0f} %'
     by_name = {(variation.parameter, variation.factor < 1.0): variation for variation in found.sensitivity}
@@ -303,7 +277,45 @@ def told(task: Task, found: Assessment, tolerance: float) -> Iterator[tuple[str,
     )
 
 
-def _texts(task: Task, chosen: dict[str, Assessment], parts: list[Part], tolerance: float) -> dict[str, str]:
+def _bought(task: Task, found: Assessment) -> Iterator[tuple[str, str]]:
+    """What spring and dashpot must be like."""
+    loads, rig = found.loads, task.rig.resolved()
+    if not math.isnan(loads.force):
+        yield (
+            'bears',
+            f'{loads.force:.1f} N at most (spring {loads.spring_force:.1f}, damper {loads.damper_force:.1f}), '
+            f'{1e3 * loads.stroke:.0f} mm of stroke ({loads.shortest:.3f} to {loads.longest:.3f} m between the hubs), '
+            f'{loads.speed:.2f} m/s in the damper'
+            + ('' if math.isnan(loads.heat) else f', {loads.heat:.0f} J of heat a minute'),
+        )
+    force = preload(rig, found.k)
+    yield (
+        'spring',
+        f'without force where the hubs are {rig.D0:.3f} m apart (D0), '
+        + (
+            'as they are at 50 %: no preload'
+            if abs(force) < LEAST_PRELOAD
+            else f'so that it {"pulls" if force > 0.0 else "pushes"} with {abs(force):.1f} N at 50 %'
+        ),
+    )
+
+
+def warnings(task: Task, found: Assessment) -> Iterator[str]:
+    """What to print large: a slope not far below the rig's on which the pair stalls, or leaves the band."""
+    stall, least = found.stall_slope, found.margins['slope'].low * task.rig.slope
+    near = (1.0 - NEAR) * task.rig.slope
+    if found.verdict is Verdict.IN_STEP and least > max(near, stall + SLOPE_SHOWN):
+        yield f'in step only above {math.degrees(least):.2f}°'
+    if stall > near:
+        yield f'stalls at {math.degrees(stall):.2f}° and below'
+
+
+def _sentence(parts: Iterator[str]) -> str:
+    text = ', '.join(parts)
+    return text[:1].upper() + text[1:]
+
+
+def _texts(task: Task, chosen: dict[str, Assessment], parts: Sequence[Part], tolerance: float) -> dict[str, str]:
     """The card's words."""
     return {
         name: '\n'.join(
@@ -324,7 +336,7 @@ def json_record(
     task: Task,
     chosen: dict[str, Assessment],
     seen: dict[str, Steps],
-    parts: list[Part],
+    parts: Sequence[Part],
     tolerance: float,
 ) -> dict[str, Any]:
     """Everything for a program; SI units and radians but where a name says otherwise; null where there is none."""
@@ -344,7 +356,7 @@ def json_record(
                 'k_nondimensional': found.k / scales.stiffness,
                 'b_nondimensional': found.b / scales.damping,
                 **(
-                    {'spring': _named(parts, 'spring', found.k), 'dashpot': _named(parts, 'dashpot', found.b)}
+                    {'spring': _named(parts, SPRING, found.k), 'dashpot': _named(parts, DASHPOT, found.b)}
                     if parts and name != GIVEN
                     else {}
                 ),
@@ -359,6 +371,10 @@ def json_record(
                 'multiplier': _known(found.multiplier),
                 'speed': _known(found.speed),
                 'damper_loss': _known(found.damper_loss),
+                'loads': load_record(found),
+                'spring_free_length': task.rig.resolved().D0,
+                'spring_preload': preload(task.rig, found.k),
+                'stall_slope': _known(found.stall_slope),
                 'margins': {
                     name: {
                         'low': margin.low,
@@ -394,8 +410,8 @@ def _rig_line(task: Task) -> str:
     ) + f', on {math.degrees(rig.slope):.3g}°.'
 
 
-def _coupler(task: Task, found: Assessment, parts: list[Part]) -> str:
-    names = ', '.join(filter(None, (_named(parts, 'spring', found.k), _named(parts, 'dashpot', found.b))))
+def _coupler(task: Task, found: Assessment, parts: Sequence[Part]) -> str:
+    names = ', '.join(filter(None, (_named(parts, SPRING, found.k), _named(parts, DASHPOT, found.b))))
     scales = nondimensional(task.rig)[1]
     return (
         f'k = {found.k:.4g} N/m, b = {found.b:.4g} N·s/m   (k̂ = {found.k / scales.stiffness:.3g}, '
@@ -403,7 +419,7 @@ def _coupler(task: Task, found: Assessment, parts: list[Part]) -> str:
     )
 
 
-def _named(parts: list[Part], kind: str, value: float) -> str:
+def _named(parts: Sequence[Part], kind: str, value: float) -> str:
     return next((part.name for part in parts if part.kind == kind and part.value == value), '')
 
 

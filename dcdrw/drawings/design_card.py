@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from textwrap import fill
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from dcdrw_sim.figures.style import BAND, BLUE, PINK, VERMILION, new_figure
+from dcdrw_sim.figures.style import BAND, BLUE, PINK, POINTS, VERMILION, new_figure
 from dcdrw_sim.study.design import GRID, Assessment, Scores, Task
 from dcdrw_sim.study.verdict import Verdict
 
@@ -15,6 +16,12 @@ A4 = 8.27, 11.69
 COLOURS = VERMILION, BLUE, PINK
 """Colours of the couplers, in their order."""
 MARKERS = '*', 'o', 'D'
+LETTERS = 120
+"""Of a line."""
+LINE = 0.138
+"""Height of a line of POINTS [inch]."""
+LARGE, LARGE_POINTS = 2.3, 16
+"""Lines that large print takes, and its size."""
 LONGEST = 60
 """Steps that the page shows."""
 
@@ -22,6 +29,7 @@ LONGEST = 60
 def draw_card(
     title: str,
     lines: dict[str, str],
+    large: dict[str, str],
     task: Task,
     grid: Scores,
     chosen: dict[str, Assessment],
@@ -32,6 +40,7 @@ def draw_card(
     Args:
         title: what it is for.
         lines: what is said of each coupler, by its name.
+        large: what of it is printed large; empty where nothing is.
         task: what they were judged by.
         grid: the couplers of the first look.
         chosen: what was found, by name.
@@ -42,30 +51,46 @@ def draw_card(
 
     """
     figure = new_figure(*A4, 'a card')
-    figure.get_layout_engine().set(w_pad=0.15, h_pad=0.12, rect=(0.03, 0.02, 0.94, 0.95))
-    figure.suptitle(title, fontsize=13, fontweight='bold')
-    words, top, middle, bottom = figure.subplots(4, 1, height_ratios=(1.4 * len(lines), 3.4, 2.6, 1.9))
-    _write(words, lines)
+    boxes = [
+        _Box(large[name], _wrapped(text), colour) for (name, text), colour in zip(lines.items(), COLOURS, strict=False)
+    ]
+    below = _write(figure, title, boxes)
+    figure.get_layout_engine().set(w_pad=0.15, h_pad=0.12, rect=(0.03, 0.02, 0.94, below - 0.03))
+    top, middle, bottom = figure.subplots(3, 1, height_ratios=(3.0, 2.1, 1.6))
     _draw_map(top, grid, chosen, on_sale)
     _draw_paths(middle, task, chosen)
     _draw_sensitivity(bottom, chosen)
     return figure
 
 
-def _write(axes: Any, lines: dict[str, str]) -> None:
-    axes.set_axis_off()
-    for row, (text, colour) in enumerate(zip(lines.values(), COLOURS, strict=False)):
-        written = axes.text(
-            0.0,
-            1.0 - row / len(lines),
-            text,
-            transform=axes.transAxes,
-            va='top',
-            fontsize=8,
-            linespacing=1.25,
-            bbox={'facecolor': 'none', 'edgecolor': colour, 'linewidth': 1.2, 'pad': 4.0},
-        )
-        written.set_in_layout(False)  # long lines do not make the drawings below narrower
+class _Box(NamedTuple):
+    """What is said of a coupler."""
+
+    large: str
+    text: str
+    colour: str
+
+    @property
+    def lines(self) -> float:
+        """The room that it takes, in lines, with its frame."""
+        return self.text.count('\n') + 2.5 + (LARGE if self.large else 0.0)
+
+
+def _wrapped(text: str) -> str:
+    return '\n'.join(fill(line, LETTERS, subsequent_indent='    ') for line in text.split('\n'))
+
+
+def _write(figure: Any, title: str, boxes: list[_Box]) -> float:
+    """Write the words; returns where they end, as a part of the page."""
+    line, place = LINE / A4[1], 0.94
+    figure.text(0.5, 0.965, title, ha='center', fontsize=13, fontweight='bold')
+    for box in boxes:
+        figure.text(0.06, place, box.large, va='top', fontsize=LARGE_POINTS, fontweight='bold', color=VERMILION)
+        below = place - (LARGE * line if box.large else 0.0)
+        frame = {'facecolor': 'none', 'edgecolor': box.colour, 'linewidth': 1.2, 'pad': 4.0}
+        figure.text(0.06, below, box.text, va='top', fontsize=POINTS, linespacing=1.25, bbox=frame)
+        place -= box.lines * line
+    return place
 
 
 def _draw_map(axes: Any, grid: Scores, chosen: dict[str, Assessment], on_sale: Mapping[str, Sequence[float]]) -> None:
@@ -93,7 +118,7 @@ def _draw_map(axes: Any, grid: Scores, chosen: dict[str, Assessment], on_sale: M
             marker,
             color=colour,
             markeredgecolor='white',
-            markersize=13,
+            markersize=9,
             label=name,
             linestyle='none',
         )
@@ -108,8 +133,12 @@ def _draw_map(axes: Any, grid: Scores, chosen: dict[str, Assessment], on_sale: M
         xlabel='b [N·s/m]',
         ylabel='k [N/m]',
     )
-    axes.legend(loc='lower left', fontsize=8)
-    axes.set_title('white: some start never comes into step for good; hatched: a wheel stalls', fontsize=8, loc='left')
+    axes.set_title('white: some start is never in step; hatched: a wheel stalls', loc='left')
+    _legend(axes)
+
+
+def _legend(axes: Any) -> None:
+    axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=4, frameon=False, borderaxespad=0.1)
 
 
 def _draw_paths(axes: Any, task: Task, chosen: dict[str, Assessment]) -> None:
@@ -125,7 +154,7 @@ def _draw_paths(axes: Any, task: Task, chosen: dict[str, Assessment]) -> None:
             )
         shown = max(shown, min(LONGEST, 3 * (1 if math.isnan(found.worst_steps) else int(found.worst_steps)) + 6))
     axes.set(xlim=(0, shown), ylim=(-50, 50), xlabel='steps of the front wheel', ylabel='error [% of a step]')
-    axes.legend(loc='upper right', fontsize=8, ncols=4)
+    _legend(axes)
 
 
 def _draw_sensitivity(axes: Any, chosen: dict[str, Assessment]) -> None:
@@ -149,7 +178,6 @@ def _draw_sensitivity(axes: Any, chosen: dict[str, Assessment]) -> None:
                     rotation=90,
                     ha='center',
                     va='bottom',
-                    fontsize=8,
                     color=colour,
                 )
             else:
@@ -158,6 +186,6 @@ def _draw_sensitivity(axes: Any, chosen: dict[str, Assessment]) -> None:
         f'{variation.parameter} {100 * (variation.factor - 1):+.0f} %'
         for variation in next(iter(chosen.values())).sensitivity
     ]
-    axes.set_xticks(range(len(labels)), labels, fontsize=8)
+    axes.set_xticks(range(len(labels)), labels)
     axes.set(ylabel='steps, worst start', ylim=(0, 1.1 * highest))
-    axes.set_title('what if one is off', fontsize=8, loc='left')
+    axes.set_title('what if one is off', loc='left')

@@ -22,7 +22,9 @@ from dcdrw_sim.model.rigs import Rigs, take
 from dcdrw_sim.model.start import require_rolling
 from dcdrw_sim.model.wheel import gentlest_slope
 from dcdrw_sim.motion.ensemble import spread
-from dcdrw_sim.study.points import section_room, study, uncoupled
+from dcdrw_sim.study.loads import Loads, loads
+from dcdrw_sim.study.points import run_starts, section_room, study, uncoupled
+from dcdrw_sim.study.regimes import gentlest_slopes
 from dcdrw_sim.study.verdict import Verdict
 
 Floats = NDArray[np.float64]
@@ -134,6 +136,9 @@ class Assessment(NamedTuple):
     """Mean speed on the limit cycle [m/s]."""
     damper_loss: float
     """Energy that the damper takes on the limit cycle [J/m]."""
+    loads: Loads
+    stall_slope: float
+    """As `stall_slope` [rad]."""
     sensitivity: tuple[Variation, ...]
     margins: dict[str, Margin]
 
@@ -151,7 +156,7 @@ class Search(NamedTuple):
     fastest: tuple[float, float]
     """k and b of fewest steps from the worst start."""
     forgiving: tuple[float, float]
-    """k and b of fewest steps from the worst start where k, b and slope may be off, as `forgiving_order`."""
+    """k and b of fewest steps from the worst start where k, b and slope may be off, as `worst_cases`."""
 
 
 Report = Callable[[int], object]
@@ -205,9 +210,9 @@ def search(
         return score(task, k, b, report=report).order()
 
     def forgiving(k: Floats, b: Floats) -> NDArray[np.int64]:
-        return forgiving_order(task, k, b, tolerance, report)
+        return worst_cases(task, k, b, tolerance, report).order
 
-    start, near = grid.order()[0], _blunt_order(grid, eased)[0]
+    start, near = grid.order()[0], _blunt(grid, eased).order[0]
     return Search(
         grid, _zoom(fastest, (grid.k[start], grid.b[start]), k, b), _zoom(forgiving, (grid.k[near], grid.b[near]), k, b)
     )
@@ -218,13 +223,17 @@ def mesh(k: tuple[float, float], b: tuple[float, float]) -> tuple[Floats, Floats
     return _mesh(np.geomspace(*k, GRID), np.geomspace(*b, GRID))
 
 
-def forgiving_order(
-    task: Task, k: Floats, b: Floats, tolerance: float, report: Report = lambda count: None
-) -> NDArray[np.int64]:
-    """The couplers' indices, best first, each as good as the worst that it may turn out to be.
+class WorstCases(NamedTuple):
+    """How N couplers do, each as badly as it may turn out to do."""
 
-    That is k and b each off by the tolerance either way, and the slope gentler by SLOPE_TOLERANCE.
-    """
+    order: NDArray[np.int64]
+    """The couplers' indices from the best to the worst."""
+    steps: Floats
+    """From the worst start, shape (N,); NaN where not every start comes into step."""
+
+
+def worst_cases(task: Task, k: Floats, b: Floats, tolerance: float, report: Report = lambda count: None) -> WorstCases:
+    """How couplers do in the worst case: k and b off by the tolerance, the slope gentler by SLOPE_TOLERANCE."""
     factors = (1.0 - tolerance, 1.0, 1.0 + tolerance)
     cases = [
         (k_factor, b_factor, slope)
@@ -240,6 +249,42 @@ def forgiving_order(
         report,
     )
     return _worst_of(scores, np.arange(len(scores.k)).reshape(CASES, -1))
+
+
+def bear(task: Task, k: Floats, b: Floats) -> list[Loads]:
+    """What couplers bear from the start of a trial to its end, whatever the start.
+
+    Args:
+        task: rig and starts.
+        k: shape (N,) [N/m].
+        b: shape (N,) [N·s/m].
+
+    Raises:
+        ValueError: as `score`.
+
+    """
+    borne: list[Loads] = []
+    for first in range(0, len(k), BLOCK):
+        piece = slice(first, first + BLOCK)
+        rigs = spread(task.rig, len(k[piece]), {'k': k[piece], 'b': b[piece]})
+        room = section_room(rigs, task.seconds)
+        cycles = study(rigs, task.seconds, task.phases, task.band_percent, room=room).cycles
+        borne += loads(rigs, *run_starts(rigs, task.seconds, task.phases, room), cycles)
+    return borne
+
+
+def stall_slope(task: Task, k: float, b: float) -> float:
+    """The slope [rad] at and below which a coupler stalls: there it has no limit cycle, or no start leads to one.
+
+    That of equal wheels is where the limit cycle ends; unequal ones are followed for as long as for margins. NaN where
+    it is gentler than 1/WIDEST of the rig's.
+    """
+    rig = task.rig._replace(k=k, b=b)
+    if rig.front == rig.rear:
+        return float(gentlest_slopes(spread(rig, 1, {})).values[0])
+    patient = task._replace(seconds=PATIENCE * task.seconds)
+    factor, verdict = _edge(patient, rig, 'slope', 1.0 / WIDEST, Verdict.ELSEWHERE)
+    return math.nan if verdict is None else factor * rig.slope
 
 
 def assess(task: Task, k: float, b: float, tolerance: float = PART_TOLERANCE) -> Assessment:
@@ -265,6 +310,8 @@ def assess(task: Task, k: float, b: float, tolerance: float = PART_TOLERANCE) ->
         float(abs(found.cycles.multipliers[0, 0])),
         float(walking.speed[0]),
         float(walking.damper[0]),
+        bear(task, np.array([k]), np.array([b]))[0],
+        stall_slope(task, k, b),
         tuple(_sensitivity(task, rig, tolerance)),
         {name: _margin(task, rig, name) for name in VARIED},
     )
@@ -288,14 +335,17 @@ def _margin(task: Task, rig: RigParams, name: str) -> Margin:
     return Margin(low, high, below, above)
 
 
-def _edge(task: Task, rig: RigParams, name: str, limit: float) -> tuple[float, Verdict | None]:
+def _edge(
+    task: Task, rig: RigParams, name: str, limit: float, still_good: Verdict = Verdict.IN_STEP
+) -> tuple[float, Verdict | None]:
+    """The last factor on the way to a limit that leads to nothing worse, and what follows; None where nothing does."""
     good, spoilt, verdict = 1.0, limit, None
     if name == 'slope':  # steeper than α no wheel stands on a spoke
         spoilt = min(limit, min(rig.front.alpha, rig.rear.alpha) / rig.slope * (1 - 1e-9))
     for _ in range(MARGIN_ROUNDS):
         factors = np.geomspace(good, spoilt, MARGIN_STEPS + 1)
         verdicts = _score(task, _multiplied(rig, name, factors))[0]
-        bad = np.flatnonzero(verdicts > Verdict.IN_STEP)
+        bad = np.flatnonzero(verdicts > still_good)
         if not bad.size:
             return spoilt, verdict
         first = int(bad[0])
@@ -370,7 +420,7 @@ def _zoom(
     return best
 
 
-def _blunt_order(*grids: Scores) -> NDArray[np.int64]:
+def _blunt(*grids: Scores) -> WorstCases:
     """The grid's couplers, each as good as the worst of its neighbours on all the grids."""
     both = Scores(*map(np.concatenate, zip(*grids, strict=True)))
     places = np.arange(len(both.k)).reshape(len(grids), GRID, GRID)
@@ -383,12 +433,13 @@ def _blunt_order(*grids: Scores) -> NDArray[np.int64]:
     )
 
 
-def _worst_of(scores: Scores, members: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The order of groups by their worst member; members of shape (of a group, groups)."""
+def _worst_of(scores: Scores, members: NDArray[np.int64]) -> WorstCases:
+    """How groups do by their worst member; members of shape (of a group, groups)."""
     rank = np.empty(len(scores.k), np.int64)
     order = scores.order()
     rank[order] = np.arange(len(order))
-    return np.argsort(rank[members].max(axis=0), kind='stable')
+    worst = rank[members].max(axis=0)
+    return WorstCases(np.argsort(worst, kind='stable'), scores.steps[order[worst]])
 
 
 def _mesh(k: Floats, b: Floats) -> tuple[Floats, Floats]:

@@ -1,11 +1,11 @@
 """`dcdrw design` as a user runs it."""
 
+import csv
 import json
 
 import pytest
 
 from dcdrw.cli import main
-from dcdrw.commands.design import read_parts
 
 PARTS = """\
 kind,value,name
@@ -13,6 +13,7 @@ spring,5.25,soft
 spring,12,firm
 dashpot,8,thin
 dashpot,100,thick
+rope,3,long
 """
 
 
@@ -34,6 +35,14 @@ def test_best_pair_of_parts_with_card_and_numbers(tmp_path, parts, capsys):
     assert found['couplers']['given']['worst_steps'] == 45
     assert found['couplers']['given']['multiplier'] == pytest.approx(0.9411, abs=1e-4)
     assert found['task']['band_percent'] == pytest.approx(6.0)
+    assert found['couplers']['given']['loads']['force'] == pytest.approx(23.9, abs=0.1)
+    assert found['couplers']['given']['spring_free_length'] == pytest.approx(1.2150, abs=1e-4)
+    with (tmp_path / 'out' / 'pairs.csv').open(encoding='utf-8') as file:
+        rows = list(csv.DictReader(file))
+    assert [row['spring'] for row in rows] == [pair['spring'] for pair in found['pairs']]
+    assert (rows[0]['spring'], rows[0]['dashpot']) == ('firm', 'thin')
+    assert "skipped, line 6: kind must be spring, dashpot, damper, got 'rope'" in output
+    assert found['skipped']
     assert (tmp_path / 'out' / 'card.pdf').read_bytes().startswith(b'%PDF')
     assert (tmp_path / 'out' / 'card.png').read_bytes().startswith(b'\x89PNG')
 
@@ -55,24 +64,6 @@ def test_what_swings_beyond_the_band_is_not_recommended_and_what_is_the_monitor_
     assert (max(fastest['steps']), max(fastest['strike_steps'])) == (6, 3)
     assert not other['recommended']
     assert (other['worst_steps'], max(other['strike_steps'])) == (None, 2)
-
-
-@pytest.mark.parametrize(
-    ('content', 'message'),
-    [
-        ('', 'header'),
-        ('kind,value\nspring,5\n', 'no dashpot'),
-        ('kind,value\nrope,5\n', 'line 2: kind must be spring or dashpot'),
-        ('kind,value\nspring,stiff\n', "line 2: value must be a number, got 'stiff'"),
-        ('kind,value\nspring,-1\n', 'line 2: value must be > 0'),
-        ('kind,value\nspring\n', 'line 2: value must be a number'),
-    ],
-)
-def test_wrong_parts_are_named(tmp_path, content, message):
-    path = tmp_path / 'parts.csv'
-    path.write_text(content)
-    with pytest.raises(ValueError, match=message):
-        read_parts(path)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.motion.ensemble import spread
-from dcdrw_sim.study.design import Task, assess, forgiving_order, mesh, score, search
+from dcdrw_sim.study.design import Task, assess, mesh, score, search, worst_cases
 from dcdrw_sim.study.points import judge_points, study
 from dcdrw_sim.study.sweep import default_seconds
 from dcdrw_sim.study.verdict import Verdict
@@ -58,13 +58,13 @@ def test_search_finds_no_worse_than_its_first_look_within_the_bounds():
     for pair in (found.fastest, found.forgiving):
         assert all(low <= value <= high for value, (low, high) in zip(pair, RANGES, strict=True))
     pairs = np.array([found.fastest, found.forgiving]).T
-    assert forgiving_order(QUICK, *pairs, 0.3)[0] == 1 or found.fastest == found.forgiving
+    assert worst_cases(QUICK, *pairs, 0.3).order[0] == 1 or found.fastest == found.forgiving
 
 
 def test_what_is_fastest_but_swings_beyond_the_band_on_a_slope_a_little_gentler_is_not_forgiving():
     k, b = np.array([60.0, 47.81]), np.array([43.01, 58.68])
     assert score(TASK, k, b).order()[0] == 0
-    assert forgiving_order(TASK, k, b, 0.0)[0] == 1
+    assert worst_cases(TASK, k, b, 0.0).order[0] == 1
 
 
 def test_margins_are_where_coming_into_step_ends():

@@ -1,0 +1,61 @@
+"""The table of springs with dashpots, ranked: for a person, for a spreadsheet, for a program."""
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from dcdrw_sim.study.design import Assessment
+from dcdrw_sim.study.loads import Loads
+from dcdrw_sim.study.parts import Pair
+from dcdrw_sim.study.verdict import Verdict
+
+COLUMNS = (
+    *('rank', 'spring', 'k', 'dashpot', 'b', 'worst_steps', 'worst_time', 'worst_steps_if_off'),
+    *(*Loads._fields, 'stroke'),
+)
+"""Of a pair, in SI units."""
+SHOWN = 12
+"""Pairs that a person is shown."""
+
+
+def pair_records(pairs: Sequence[Pair]) -> list[dict[str, Any]]:
+    """The pairs that work, the best first, in SI units; None where there is no such number."""
+    records = []
+    for rank, pair in enumerate(working(pairs), 1):
+        parts = pair.spring.name, pair.spring.value, pair.dashpot.name, pair.dashpot.value
+        if_off = None if math.isnan(pair.steps_if_off) else pair.steps_if_off
+        values = rank, *parts, pair.steps, pair.time, if_off, *load_record(pair).values()
+        records.append(dict(zip(COLUMNS, values, strict=True)))
+    return records
+
+
+def load_record(coupler: Pair | Assessment) -> dict[str, float | None]:
+    """What a coupler bears, as `Loads`, in SI units; None where there is no such number."""
+    known = {**coupler.loads._asdict(), 'stroke': coupler.loads.stroke}
+    return {name: None if math.isnan(value) else value for name, value in known.items()}
+
+
+def working(pairs: Sequence[Pair]) -> list[Pair]:
+    """The pairs that come into step from every start, and that all rated limits allow."""
+    return [pair for pair in pairs if pair.works]
+
+
+def pair_lines(pairs: Sequence[Pair], starts: int) -> Iterator[str]:
+    """The table for a person."""
+    good = working(pairs)
+    yield f'{len(good)} of {len(pairs)} pairs come into step from each of {starts} starts, within all rated limits'
+    if good:
+        yield '      k [N/m]  b [N·s/m]  steps  if off  force [N]  stroke [mm]  speed [m/s]  heat [J/min]  parts'
+    for rank, pair in enumerate(good[:SHOWN], 1):
+        loads, off = pair.loads, '–' if math.isnan(pair.steps_if_off) else f'{pair.steps_if_off:.0f}'
+        yield (
+            f'{rank:4}  {pair.spring.value:7.4g}  {pair.dashpot.value:9.4g}  {pair.steps:5.0f}  {off:>6}'
+            f'  {loads.force:9.1f}  {1e3 * loads.stroke:11.0f}  {loads.speed:11.2f}  {loads.heat:12.0f}  '
+            + ', '.join(filter(None, (pair.spring.name, pair.dashpot.name)))
+        ).rstrip()
+    if len(good) > SHOWN:
+        yield f'      and {len(good) - SHOWN} more: --out writes all of them to pairs.csv, --json tells them'
+    beyond = Counter(limit for pair in pairs if pair.verdict is Verdict.IN_STEP for limit in pair.exceeded)
+    for limit, count in beyond.items():
+        yield f'      left out, beyond the {limit}: {count} pair{"s" if count > 1 else ""}'

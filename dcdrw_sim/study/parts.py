@@ -1,0 +1,97 @@
+"""Springs and dashpots on sale, and which pairs of them bring a rig into step without being asked for too much."""
+
+import math
+from collections.abc import Iterable
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from dcdrw_sim.study.design import Report, Task, bear, score, worst_cases
+from dcdrw_sim.study.loads import UNKNOWN, Loads
+from dcdrw_sim.study.verdict import Verdict
+
+SPRING, DASHPOT = 'spring', 'dashpot'
+
+
+class Part(NamedTuple):
+    """A spring or a dashpot on sale."""
+
+    kind: str
+    """SPRING or DASHPOT."""
+    value: float
+    """Stiffness [N/m] or damping [N·s/m]."""
+    name: str = ''
+    max_force: float = math.inf
+    """That it is rated for [N]."""
+    max_stroke: float = math.inf
+    """That it is rated for [m]: a spring's change of length from its free length, a dashpot's travel."""
+    max_speed: float = math.inf
+    """That it is rated for [m/s]."""
+
+    def exceeded(self, force: float, stroke: float, speed: float) -> list[str]:
+        """The rated limits that these loads exceed, by their names."""
+        asked = {'max_force': force, 'max_stroke': stroke, 'max_speed': speed}
+        return [f'{self.kind} {limit}' for limit, value in asked.items() if value > getattr(self, limit)]
+
+
+class Pair(NamedTuple):
+    """A spring with a dashpot, and how they do."""
+
+    spring: Part
+    dashpot: Part
+    verdict: Verdict
+    """Of the worst start."""
+    steps: float
+    """To synchronization from the worst start; NaN where not every start comes into step."""
+    time: float
+    """The same as time [s]."""
+    steps_if_off: float
+    """The same where k and b are off and the slope is gentler, in the worst case; NaN where it does not come then."""
+    rank_if_off: int
+    """By what it may turn out to be, from 0 on."""
+    loads: Loads
+    """NaN where it does not come into step."""
+    exceeded: tuple[str, ...]
+    """Rated limits that do not allow it."""
+
+    @property
+    def works(self) -> bool:
+        """Whether it comes into step from every start, and all rated limits allow it."""
+        return self.verdict is Verdict.IN_STEP and not self.exceeded
+
+
+def rank(task: Task, parts: Iterable[Part], tolerance: float, report: Report = lambda count: None) -> list[Pair]:
+    """Every pair of a spring and a dashpot, those that work first, the fastest of them before all.
+
+    Args:
+        task: rig and starts.
+        parts: on sale.
+        tolerance: by which part k and b may be off, in [0, 1).
+        report: told how many more couplers are scored; `CASES` + 1 of a pair.
+
+    Raises:
+        ValueError: as `dcdrw_sim.study.design.score`.
+
+    """
+    parts = list(parts)
+    kinds = ([part for part in parts if part.kind == kind] for kind in (SPRING, DASHPOT))
+    couples = list(product(*kinds))
+    k, b = (np.array([couple[i].value for couple in couples]) for i in range(2))
+    scores = score(task, k, b, report=report)
+    off = worst_cases(task, k, b, tolerance, report)
+    ranks = np.argsort(off.order)
+    works = np.flatnonzero(scores.verdict == Verdict.IN_STEP)
+    borne = dict(zip(works.tolist(), bear(task, k[works], b[works]), strict=True))
+    pairs = []
+    for index in scores.order().tolist():
+        spring, dashpot = couples[index]
+        loads = borne.get(index, UNKNOWN)
+        exceeded = [
+            *spring.exceeded(loads.spring_force, loads.spring_force / spring.value, loads.speed),
+            *dashpot.exceeded(loads.damper_force, loads.stroke, loads.speed),
+        ]
+        verdict = Verdict(int(scores.verdict[index]))
+        steps, time, if_off = (float(column[index]) for column in (scores.steps, scores.time, off.steps))
+        pairs.append(Pair(spring, dashpot, verdict, steps, time, if_off, int(ranks[index]), loads, tuple(exceeded)))
+    return sorted(pairs, key=lambda pair: not pair.works)

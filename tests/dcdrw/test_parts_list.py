@@ -1,0 +1,93 @@
+"""Parts lists as people have them."""
+
+import math
+
+import pytest
+
+from dcdrw.parts_list import read_parts
+from dcdrw_sim.study.parts import Part
+from tests import ROOT
+
+
+@pytest.fixture
+def read(tmp_path):
+    def written(text):
+        path = tmp_path / 'parts.csv'
+        path.write_text(text, encoding='utf-8')
+        return read_parts(path)
+
+    return written
+
+
+SOFT, OIL = Part('spring', 10.0, 'soft'), Part('dashpot', 100.0, 'oil')
+
+
+@pytest.mark.parametrize(
+    'text',
+    [
+        'kind,value,name\nspring,10,soft\ndashpot,100,oil\n',
+        'Kind;Value;Name\nSPRING;10;soft\nDamper;100;oil\n',
+        'type\tname\trate\n Spring \tsoft\t10 N/m\n\ndamper\toil\t0.1 N·s/mm\n',
+        'kind,value [N/mm],name\nspring,0.01,soft\ndashpot,100 Ns/m,oil\n',
+        'kind;value;name\nspring;10,0;soft\ndashpot;0,1 N*s/mm;oil\n',
+        'kind,value (kN/m),part number\nspring,"0,01",soft\ndamper,100 N/(m/s),oil\n',
+    ],
+)
+def test_separators_units_case_and_decimal_commas_all_tell_the_same(read, text):
+    offer = read(text)
+    assert offer.skipped == ()
+    for part, expected in zip(offer.parts, (SOFT, OIL), strict=True):
+        assert part._replace(value=0.0) == expected._replace(value=0.0)
+        assert part.value == pytest.approx(expected.value, rel=1e-12)
+
+
+def test_rated_limits_are_read_in_their_units(read):
+    offer = read('kind,value,name,max_force [N],Max Stroke (mm),max_speed\nspring,10,,5,200,\ndamper,9,x,,0.3 m,0.5\n')
+    spring, dashpot = offer.parts
+    assert spring[3:] == (5.0, pytest.approx(0.2), math.inf)
+    assert dashpot[3:] == (math.inf, pytest.approx(0.3), 0.5)
+
+
+@pytest.mark.parametrize(
+    ('row', 'reason'),
+    [
+        ('rope,5,x', "line 4: kind must be spring, dashpot, damper, got 'rope'"),
+        ('spring,stiff,x', "line 4: value must be a number > 0, got 'stiff'"),
+        ('spring,-1,x', "line 4: value must be a number > 0, got '-1'"),
+        ('spring', "line 4: value must be a number > 0, got ''"),
+        ('spring,"1,250",x', 'line 4: 1,250 may be 1.250 or 1250: write one of them'),
+        ('spring,5 kg,x', "line 4: 'kg' is not a unit like N/m"),
+        ('spring,5 N·s/m,x', "line 4: 'N·s/m' is not a unit like N/m"),
+    ],
+)
+def test_what_is_skipped_is_told(read, row, reason):
+    offer = read(f'kind,value,name\nspring,10,soft\ndashpot,100,oil\n{row}\n')
+    assert offer.parts == (SOFT, OIL)
+    assert offer.skipped == (reason,)
+
+
+def test_a_thousand_is_told_from_a_decimal_where_the_list_shows_its_sign(read):
+    spring, *_ = read('kind;value\nspring;1,250\ndamper;5,5\n').parts
+    assert spring.value == pytest.approx(1.25)
+    spring, *_ = read('kind,value\nspring,"1,250.5"\ndamper,5\n').parts
+    assert spring.value == pytest.approx(1250.5)
+
+
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('', 'must begin with the heading kind,value,name'),
+        ('a,b\n1,2\n', "heading kind,value,name, got 'a,b'"),
+        ('kind,value\nspring,5\n', 'has no dashpot that can be used'),
+        ('kind,value\nrope,5\n', "has no spring that can be used; line 2: kind must be spring.*got 'rope'"),
+    ],
+)
+def test_what_is_no_list_is_told(read, text, message):
+    with pytest.raises(ValueError, match=message):
+        read(text)
+
+
+def test_the_sample_list_is_read_whole():
+    offer = read_parts(ROOT / 'config' / 'parts.csv')
+    assert (offer.pairs, offer.skipped) == (16, ())
+    assert {part.value for part in offer.parts} == {5.25, 16.0, 40.0, 100.0, 8.0, 20.0, 50.0}
