@@ -18,6 +18,7 @@ EXECUTABLES = {
     'leg_tracker': 'dcdrw_control.legs.leg_tracker_node',
     'virtual_camera': 'dcdrw_sim.camera.virtual_camera_node',
     'synchronizer': 'dcdrw_control.sync.synchronizer_node',
+    'xrl_reference': 'dcdrw_control.reference.xrl_reference_node',
     'rig_markers': 'dcdrw.nodes.rig_markers_node',
     'recorder': 'dcdrw.nodes.recorder_node',
     'suite': 'dcdrw.nodes.suite',

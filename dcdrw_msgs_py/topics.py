@@ -98,6 +98,23 @@ LEG_PHASES = Topic(
     'phase of each leg that is known, front_left and so on: 2π per stride, 0 at heel strike, rad, and its rate',
     SAMPLE_DEPTH,
 )
+XRL_LEG_PHASES = Topic(
+    'xrl_leg_phases',
+    'sensor_msgs/msg/JointState',
+    "phase that the robot's legs shall have, rear_left and rear_right: as leg_phases, a quarter stride ahead",
+    SAMPLE_DEPTH,
+)
+JOINT_TRAJECTORY = Topic(
+    'joint_trajectory',
+    'trajectory_msgs/msg/JointTrajectory',
+    "what the robot's joints shall do next; renewed before it ends, at rest where it ends",
+)
+PLANNED_FOOTFALLS = Topic(
+    'xrl_reference/rear_footfalls',
+    'geometry_msgs/msg/PointStamped',
+    "one per planned footfall of the robot, at its own time, in the frame slope: y > 0 is the left foot's",
+    SAMPLE_DEPTH,
+)
 RIG_MARKERS = Topic('rig_markers', 'visualization_msgs/msg/MarkerArray', 'the rig, drawn, at most 30 Hz')
 IMAGE_RAW = Topic('image_raw', 'sensor_msgs/msg/Image', 'the rig as a camera on its left sees it', 2)
 CAMERA_INFO = Topic('camera_info', 'sensor_msgs/msg/CameraInfo', 'lens and sensor of that camera', 2)

@@ -50,6 +50,11 @@ ARGUMENTS = {
         'estimator, monitor and synchronizer in one process; the synchronizer stays idle until enabled',
         SWITCH,
     ),
+    'xrl_reference': (
+        'false',
+        "plan the robot's legs a quarter stride ahead of the person's: of legs, or of the front wheel",
+        SWITCH,
+    ),
     'markers': ('false', 'draw the rig for RViz and Foxglove; rviz implies it', SWITCH),
     'rviz': ('false', 'show the rig in RViz, with its URDF in robot_state_publisher (needs both packages)', SWITCH),
 }
@@ -102,6 +107,8 @@ def _actions(context):
         actions.append(node('recorder', record=on['record'], **texts(folder='folder')))
     if on['markers'] or on['rviz']:
         actions.append(node('rig_markers'))
+    if on['xrl_reference']:
+        actions.append(node('xrl_reference', person='legs' if source == 'legs' else 'wheel'))
     if on['live']:
         actions.append(command('live', *(['--rig', chosen['params_file']] if chosen['params_file'] else [])))
     if source == 'rig':

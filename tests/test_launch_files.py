@@ -82,6 +82,11 @@ def test_switches_add_their_tools(started):
     assert watched['commands'] == [['live', '--namespace', 'lab']]
 
 
+def test_the_robots_legs_follow_people_or_the_front_wheel(started):
+    assert set(started(source='legs', xrl_reference='true')['nodes']) == {*CORE, 'leg_tracker', 'xrl_reference'}
+    assert set(started(xrl_reference='true')['nodes']) == {*CORE, 'simulator', 'xrl_reference'}
+
+
 def test_one_process_takes_the_place_of_several(started):
     assert set(started(one_process='true')['nodes']) == {'suite', 'simulator'}
 

@@ -41,7 +41,8 @@ from pathlib import Path
 class Blocked:
     def find_spec(self, name, path=None, target=None):
         if name.split('.')[0] in ('rclpy', 'std_msgs', 'sensor_msgs', 'geometry_msgs', 'diagnostic_msgs',
-                                  'builtin_interfaces', 'rcl_interfaces', 'rosgraph_msgs', 'std_srvs'):
+                                  'trajectory_msgs', 'builtin_interfaces', 'rcl_interfaces', 'rosgraph_msgs',
+                                  'std_srvs'):
             raise ImportError(f'{name} is blocked')
 sys.meta_path.insert(0, Blocked())
 """

@@ -6,6 +6,7 @@ from dcdrw import entry
 from dcdrw.drawings.rig_markers import MarkerParams
 from dcdrw.suite.recorder_params import RecorderParams
 from dcdrw_control.legs.params import LegParams
+from dcdrw_control.reference.params import ReferenceParams
 from dcdrw_control.sync.synchronizer import SynchronizerParams
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.tagging import TagParams
@@ -22,6 +23,7 @@ from dcdrw_msgs_py.topics import (
     IMAGE_COMPRESSED,
     IMAGE_RAW,
     JOINT_STATES,
+    JOINT_TRAJECTORY,
     LEG_JOINT_STATES,
     LEG_PHASES,
     LEG_SENSORS,
@@ -29,6 +31,7 @@ from dcdrw_msgs_py.topics import (
     PERSON_FORCE,
     PHASE_STATE,
     PHI,
+    PLANNED_FOOTFALLS,
     REAR_POSE,
     REAR_TORQUE_COMMAND,
     RIG_MARKERS,
@@ -41,6 +44,7 @@ from dcdrw_msgs_py.topics import (
     SYNCHRONIZED,
     SYNCHRONIZER_STATE,
     TAG_DETECTIONS,
+    XRL_LEG_PHASES,
     Topic,
 )
 from dcdrw_sim.camera.render import LookParams
@@ -149,9 +153,18 @@ SYNCHRONIZER = Executable(
     by_choice=(REAR_TORQUE_COMMAND,),
 )
 
+XRL_REFERENCE = Executable(
+    'xrl_reference',
+    "from the person's legs to what the robot's shall do, a quarter stride ahead, while somebody enables it",
+    (ReferenceParams,),
+    (LEG_PHASES, PHASE_STATE, ENABLE),
+    (XRL_LEG_PHASES, JOINT_TRAJECTORY, PLANNED_FOOTFALLS, DIAGNOSTICS),
+    by_choice=(PHASE_STATE,),
+)
+
 TRIAL = (SIMULATOR, PHASE_ESTIMATOR, SYNC_MONITOR)
 """The nodes of a trial in simulation."""
-EXECUTABLES = (*TRIAL, TAG_TRACKER, LEG_TRACKER, SYNCHRONIZER, VIRTUAL_CAMERA, MARKERS, RECORDER)
+EXECUTABLES = (*TRIAL, TAG_TRACKER, LEG_TRACKER, SYNCHRONIZER, XRL_REFERENCE, VIRTUAL_CAMERA, MARKERS, RECORDER)
 
 RECORDED = (
     *dict.fromkeys(

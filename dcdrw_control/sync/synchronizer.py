@@ -3,6 +3,7 @@
 import math
 from typing import Annotated, Literal, NamedTuple, get_args
 
+from dcdrw_control.heartbeat import ENABLE_TIMEOUT, EnableTimeout, Heartbeat
 from dcdrw_control.sync.hold import HoldGains, HoldLaw
 from dcdrw_control.sync.rear import HubGains, RearLaw
 from dcdrw_control.sync.safety import Fault, Limits, Safety, State
@@ -34,9 +35,7 @@ class SynchronizerParams(NamedTuple):
     stale_after: Annotated[
         float, Quantity('without a sample for this long the input is stale: a fault', 's', above=0.0, high=0.08)
     ] = 0.07
-    enable_timeout: Annotated[
-        float, Quantity('an enable that is not renewed for this long counts as false', 's', above=0.0, high=1.0)
-    ] = 0.15
+    enable_timeout: EnableTimeout = ENABLE_TIMEOUT
     stall_after: Annotated[
         float, Quantity('a wheel without a strike for this long has stalled: a fault', 's', above=0.0, high=10.0)
     ] = 2.0
@@ -84,7 +83,7 @@ class Synchronizer:
         self.safety = Safety(params.limits, self.drives_hub)
         alphas = params.front.alpha, params.rear.alpha
         self._law = RearLaw(params.hub, *alphas) if self.drives_hub else HoldLaw(params.hold, *alphas)
-        self._heartbeat = -math.inf
+        self._heartbeat = Heartbeat(params.enable_timeout)
         self._forget()
         self.refused = 0
         """Messages that could not be read, or that had no place."""
@@ -98,7 +97,7 @@ class Synchronizer:
 
     def enable(self, now: float, on: bool) -> None:
         """Take a heartbeat; false ends it at once."""
-        self._heartbeat = now if on else -math.inf
+        self._heartbeat.take(now, on)
 
     def refuse(self) -> None:
         """A message was not a sample: a wheel is missing, or a value is not a number."""
@@ -150,7 +149,7 @@ class Synchronizer:
             and self._last is not None
             and abs(self._last.step_difference) <= MOST_STEPS_APART
         )
-        state = self.safety.update(now, now - self._heartbeat <= self.params.enable_timeout, ready)
+        state = self.safety.update(now, self._heartbeat.lasts(now), ready)
         if self.drives_hub:
             rate = self._last.rear.rate if self._last else math.nan
         else:
