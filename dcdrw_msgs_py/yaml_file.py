@@ -37,7 +37,7 @@ def number(text: str) -> int | float | None:
         try:
             return float(value)
         except OverflowError:
-            return math.copysign(math.inf, value)
+            return math.inf if value > 0 else -math.inf
     if _FLOAT.fullmatch(text):
         return float(re.sub(r'\.(?=inf|nan)', '', text, flags=re.IGNORECASE))
     return None

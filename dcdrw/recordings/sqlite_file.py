@@ -114,7 +114,8 @@ class SqliteFile(BagFile):
         try:
             counts = self._query('SELECT topic_id, count(*), min(timestamp), max(timestamp) FROM messages GROUP BY 1')
             whole = self._query("SELECT count(*) FROM messages WHERE typeof(timestamp) = 'integer'")
-            if whole != [(sum(row[1] for row in counts),)]:
+            times = [time for row in counts for time in row[2:]]
+            if whole != [(sum(row[1] for row in counts),)] or not all(isinstance(time, int) for time in times):
                 self._damage['time'] = f'{self.name}: a message has no possible time'
                 raise sqlite3.DataError
             self._count([row for row in counts if row[0] in self._names])

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dcdrw_msgs_py.text_file import LARGEST_TEXT
-from dcdrw_msgs_py.yaml_file import DEEPEST, parse_yaml, read_yaml, yaml_text
+from dcdrw_msgs_py.yaml_file import DEEPEST, number, parse_yaml, read_yaml, yaml_text
 
 SCALARS = [
     *('1', '-7', '+3', '0x1F', '010', '08', '9223372036854775807', '9223372036854775808'),
@@ -94,3 +94,7 @@ def test_a_name_is_text_whatever_it_looks_like(name, tmp_path):
     assert read_yaml(path) == {'rear': {name: [-0.01]}}
     path.write_text(yaml_text(read_yaml(path)))
     assert read_yaml(path) == {'rear': {name: [-0.01]}}
+
+
+def test_an_integer_beyond_every_double_is_infinite():
+    assert (number('9' * 400), number('-' + '9' * 400)) == (math.inf, -math.inf)
