@@ -16,9 +16,11 @@ from typing import Any
 
 from dcdrw.console import domain, interrupted_status, interruptible, need
 from dcdrw.page.live_state import FRAMES_KEPT, Command, read_command
+from dcdrw.page.overlay import overlay
 from dcdrw.suite.executables import RECORDER, TRIAL
 from dcdrw.suite.parameter_file import TrialParams, add_rig_options, chosen_params, write_parameter_file
 from dcdrw.suite.processes import NodeProcess, free_domain
+from dcdrw.trials.results import read_trial
 
 PORT = 8800
 AUTO = 'auto'
@@ -46,6 +48,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--port', type=_port, default=PORT, metavar='N', help='0: any free one (default: %(default)s)')
     parser.add_argument('--host', default='127.0.0.1', metavar='ADDRESS', help='to serve at (default: %(default)s)')
     parser.add_argument('--token', help=f'what browsers must know; {AUTO}: make one up')
+    parser.add_argument(
+        '--over', type=Path, metavar='RECORDING', help='draw an earlier trial of the rig beneath the live one'
+    )
     parser.add_argument('--open', action='store_true', help='open the page in a browser')
 
 
@@ -61,6 +66,7 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f'--token must have at least {SHORTEST_TOKEN} characters; {AUTO} makes one up')
     if not token and not is_loopback(options.host):
         raise ValueError(f'{options.host} is open to others: give a --token, or --token {AUTO}')
+    over = overlay(read_trial(options.over)[0], options.over.resolve().name) if options.over else None
     with ExitStack() as stack:
         stopped = stack.enter_context(interruptible())
         listener = stack.enter_context(listen_at(options.host, options.port))
@@ -68,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
         nodes = _start_nodes(params, options.namespace, environment, stack) if options.trial else []
         os.environ.update(environment)
         commands: SimpleQueue[Command] = SimpleQueue()
-        server = PageServer(listener, token, FRAMES_KEPT, lambda text: commands.put(read_command(text)))
+        server = PageServer(listener, token, FRAMES_KEPT, lambda text: commands.put(read_command(text)), over)
         stack.callback(server.close)
         executor = _listener(params, options.namespace, server, commands, bool(nodes), stack)
         address = _address(listener, token)

@@ -60,7 +60,8 @@ function ticksBetween(low, high, count) {
   return ticks;
 }
 
-export function drawPhi(points, now, board) {
+// Beneath lies an earlier trial, from the start of this one on.
+export function drawPhi(points, now, board, over) {
   const pitch = board ? board.pitch_deg : 30;
   const chart = frameOf('phi-canvas', 0, pitch, [0, pitch / 2, pitch].map((tick) => Number(tick.toFixed(1))));
   const { canvas, context, y, right } = chart;
@@ -73,11 +74,20 @@ export function drawPhi(points, now, board) {
   context.strokeStyle = colour('band');
   line(context, [[LEFT, y(pitch / 2)], [right, y(pitch / 2)]]);
   const x = timeAxis(chart, now);
+  const wraps = ([, phi], [, last]) => Math.abs(phi - last) > pitch / 2;
+  canvas.dataset.over = 0;
+  if (over) {
+    const seen = over.phis.map(([t, phi]) => [over.start + t, phi]).filter(([t]) => t > now - WINDOW_SECONDS && t <= now);
+    canvas.dataset.over = seen.length;
+    context.strokeStyle = colour('front');
+    context.globalAlpha = 0.4;
+    context.lineWidth = 4;
+    for (const piece of pieces(seen, wraps)) line(context, piece.map(([t, phi]) => [x(t), y(phi)]));
+    context.globalAlpha = 1;
+  }
   context.strokeStyle = colour('ink');
   context.lineWidth = 2.2;
-  for (const piece of pieces(points, ([, phi], [, last]) => Math.abs(phi - last) > pitch / 2)) {
-    line(context, piece.map(([t, phi]) => [x(t), y(phi)]));
-  }
+  for (const piece of pieces(points, wraps)) line(context, piece.map(([t, phi]) => [x(t), y(phi)]));
   const last = points.at(-1);
   if (last) {
     context.fillStyle = colour('ink');

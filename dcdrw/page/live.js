@@ -21,6 +21,7 @@ const SIGNS = {
 const element = (id) => document.getElementById(id);
 let socket = null, wait = FIRST_WAIT_MS, timer = 0, heardAt = -Infinity, scheduled = 0;
 let kept, frame, frameAt, board, run;
+let over = null;  // an earlier trial, drawn beneath the live one
 
 function forget() {
   kept = { phis: [], forces: [], falls: [] };
@@ -100,11 +101,20 @@ function schedule() {
 function draw() {
   watch();
   drawRig(frame && frame.rig, board);
-  drawPhi(kept.phis, now(), board);
+  drawPhi(kept.phis, now(), board, sameWheels() && frame.start !== null ? { ...over, start: frame.start } : null);
   drawGait(kept.falls, now());
   drawForce(kept.forces, now());
   drawErrors(board);
   if (board) showNodes(board.nodes);
+}
+
+const sameWheels = () => over && frame && board && JSON.stringify(over.wheels) === JSON.stringify(board.wheels);
+
+// Which earlier trial lies beneath, or why it does not.
+function showOver() {
+  if (!over || !board) return;
+  const told = !sameWheels() ? 'is of other wheels' : frame.start === null ? 'waits for the start of a trial' : 'beneath';
+  element('over').textContent = `– ${over.name} ${told}`;
 }
 
 // The state, its age and what may be done, from the last frame or from its absence.
@@ -119,6 +129,7 @@ function watch() {
   }
   showAge();
   showFigures(frame && frame.rig);
+  showOver();
 }
 
 function showState(state, detail) {
@@ -181,6 +192,7 @@ function showNodes(nodes) {
 }
 
 forget();
+fetch('over.json').then((answer) => answer.json()).then((trial) => { over = trial; schedule(); });
 setUpControls((command) => {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command));
 });

@@ -81,15 +81,24 @@ class PageServer:
         token: what a browser must know; empty: nothing, but it must be on this machine.
         kept: frames kept for browsers that come.
         on_command: told each message of a browser, in the server's thread; raises ValueError where it is none.
+        over: an earlier trial to be drawn beneath the live one, as `dcdrw.page.overlay` makes it.
 
     """
 
-    def __init__(self, listener: socket.socket, token: str, kept: int, on_command: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        listener: socket.socket,
+        token: str,
+        kept: int,
+        on_command: Callable[[str], None],
+        over: dict[str, Any] | None = None,
+    ) -> None:
         self._listener, self._token, self._on_command = listener, token, on_command
         self._cookie = _COOKIE.format(port=listener.getsockname()[1])
         self._known: set[Any] = set()
         """Connections over which a whole request has come."""
         self._files = {path: ((PAGE / name).read_bytes(), kind) for path, (name, kind) in _FILES.items()}
+        self._files['/over.json'] = (_json(over).encode(), 'application/json')
         self._frames: deque[str] = deque(maxlen=kept)
         self._fresh_at = -math.inf
         self._count = 0
@@ -101,8 +110,7 @@ class PageServer:
 
     def show(self, frame: dict[str, Any]) -> None:
         """Show a frame to all; from any thread."""
-        text = json.dumps(frame, ensure_ascii=False, allow_nan=False, separators=(',', ':'))
-        self._loop.call_soon_threadsafe(self._append, text)
+        self._loop.call_soon_threadsafe(self._append, _json(frame))
 
     def close(self) -> None:
         """Send everybody away, and end the thread."""
@@ -216,6 +224,10 @@ class PageServer:
         """Frames as browsers get them, with how long ago the newest of all was made [s]: it may be a replay."""
         age = min(time.monotonic() - self._fresh_at, LONGEST_AGE)
         return f'{{"age":{age:.3f},"frames":[{",".join(frames)}]}}'
+
+
+def _json(content: dict[str, Any] | None) -> str:
+    return json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(',', ':'))
 
 
 async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:

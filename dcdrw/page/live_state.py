@@ -26,6 +26,7 @@ from dcdrw_msgs_py.rolling import default_stance_distance, phi_pitch, stance, st
 from dcdrw_msgs_py.samples import Footfall, JointSample, PhaseSample
 from dcdrw_tracker.gait.diagnostics import diagnose_sync
 from dcdrw_tracker.gait.pair_state import judge
+from dcdrw_tracker.gait.rest import moves
 from dcdrw_tracker.gait.sync import SyncMonitor, SyncStatus
 
 FRAME_RATE = 25.0
@@ -117,6 +118,8 @@ class LiveState:
         self._health: dict[str, _Health] = {}
         self._feet: dict[str, float] = {}
         self._run = 0
+        self._start: float | None = None
+        """When the wheels were let go, by the charts' time; None where the page has not seen it."""
         self._epoch_ns: int | None = None
         self._phi_due_ns = self._force_due_ns = 0
         self._force_range = math.inf, -math.inf
@@ -163,6 +166,8 @@ class LiveState:
             return
         if self._begins_anew(phase, now):
             self._restart()
+        if self._start is None and moves(phase) and phase.front_steps == phase.rear_steps == 0:
+            self._start = self._seconds((self._phases[-1] if self._phases else phase).stamp_ns)
         self._phases.append(phase)
         self._phase_at = now
         self._counted += 1
@@ -209,7 +214,7 @@ class LiveState:
         status = self._monitor.status()
         state, detail = self._judge(status, now)
         age = _rounded(now - self._phase_at, 2)
-        frame: dict[str, Any] = {'state': state, 'detail': detail, 'age': age, 'run': self._run}
+        frame: dict[str, Any] = {'state': state, 'detail': detail, 'age': age, 'run': self._run, 'start': self._start}
         if self._phases:
             frame['rig'] = self._rig()
         for name, new in (
@@ -240,6 +245,7 @@ class LiveState:
     def _restart(self) -> None:
         """The source has started anew, or its clock was set: what the charts had is of another run."""
         self._run += 1
+        self._start = None
         for kept in (self._phases, self._phis, self._forces, self._falls, self._feet):
             kept.clear()
         self._renew()
