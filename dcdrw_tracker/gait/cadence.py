@@ -80,7 +80,7 @@ class Cadence:
         intervals = self._intervals
         intervals.append(interval)
         if len(intervals) in self._counts:
-            self._beat = beat = _learned(intervals, self._beat)
+            self._beat = beat = _learned(intervals, self._beat, self._counts == LEARNING_COUNTS[-1:])
             self.period_ns, self.burst = round(beat.sample_ns), round(beat.size)
             if len(intervals) == LEARNING_COUNTS[-1]:
                 self._settle()
@@ -149,8 +149,11 @@ class Cadence:
         return gaps, lost, longest_ns, intervals[first:], before
 
 
-def _learned(intervals: list[int], known: _Beat | None) -> _Beat:
-    """The beat of these intervals; that which was known where they come in bursts that tell none."""
+def _learned(intervals: list[int], known: _Beat | None, is_sure: bool) -> _Beat:
+    """The beat of these intervals; that which was known where they come in bursts that tell none.
+
+    A source that surely sent one by one, as far apart as samples still are, sends no bursts: it loses samples.
+    """
     ordered = sorted(intervals)
     one_by_one = _Beat(median_low(ordered))
     # The widest step between neighbouring lengths parts the intervals within bursts from those between them.
@@ -159,6 +162,8 @@ def _learned(intervals: list[int], known: _Beat | None) -> _Beat:
     if not ratios or ratios[widest] * TOGETHER < 1.0:
         return one_by_one
     together = ordered[widest]
+    if known and is_sure and known.size == 1.0 and together > 0.5 * known.period_ns:
+        return known
     ends = [place for place, interval in enumerate(intervals) if interval > together]
     sums = list(accumulate(intervals, initial=0))
     sizes = [later - earlier for earlier, later in pairwise(ends)]

@@ -168,7 +168,7 @@ class SyncMonitor:
         if n - last.step_difference != front_strikes - rear_strikes and not _may_miss_strikes(last, phase, dt):
             return self._restart(phase)
         self._cadence.tick(stamp_ns)
-        dt = self._cadence.seconds(dt)
+        dt = self._seconds(last, phase, front_strikes, rear_strikes, dt)
         if self._rest.update(phase):  # the time for which the wheels were held counts for no stall
             self._struck_ns = {FRONT: stamp_ns, REAR: stamp_ns}
         self._is_held = self._rest.held
@@ -180,6 +180,17 @@ class SyncMonitor:
         self._take_error(last, phase, front_strikes, rear_strikes, dt)
         self._last = phase
         return self._sample(phase)
+
+    def _seconds(self, last: PhaseSample, now: PhaseSample, front: int, rear: int, dt: float) -> float:
+        """The time in which the wheels turned on [s]: that of the stamps, but within bursts, stamped as they arrive."""
+        even = self._cadence.seconds(dt)
+        if even == dt:
+            return dt
+        turned = abs(now.front.angle - last.front.angle + 2.0 * self._front_alpha * front) + abs(
+            now.rear.angle - last.rear.angle + 2.0 * self._rear_alpha * rear
+        )
+        speed = 0.5 * sum(abs(rate) for rate in (last.front.rate, now.front.rate, last.rear.rate, now.rear.rate))
+        return even if abs(speed * even - turned) < abs(speed * dt - turned) else dt
 
     @property
     def restarts(self) -> int:

@@ -108,11 +108,11 @@ def parameter(bench: Bench, name: str) -> Any:
     return parameter_value_to_python(answer.values[0])
 
 
-def test_what_is_drawn_follows_the_data(bench, live, chromium):
+def test_what_is_drawn_follows_the_data(bench, live, chromium, live_trial):
     phases, joints, verdicts = bench.hear(PHASE_STATE), bench.hear(JOINT_STATES), bench.hear(VERDICT)
     start_nodes(bench)
     token = 'known-to-this-browser'
-    address = live.start('--token', token)
+    address = live.start('--token', token, '--over', str(live_trial))
     tab = chromium.tab(address)
     assert tab.value('location.search') == '', 'the token is no longer in the address'
     # The topics are found one after the other; without the coupler's length the feet are the footfalls' guess.
@@ -143,6 +143,9 @@ def test_what_is_drawn_follows_the_data(bench, live, chromium):
     tab.open(address.split('?')[0])  # the cookie is enough
     tab.wait(f'{STATE} === "{PairState.SYNCHRONIZED.value}"')
     tab.wait("document.getElementById('phi-canvas').dataset.points > 100")
+    tab.value("document.getElementById('reset').click()")  # a new start, beneath which the earlier trial lies
+    tab.wait("document.getElementById('over').textContent.endsWith('beneath')")
+    tab.wait("document.getElementById('phi-canvas').dataset.over > 10")
     assert tab.complaints == []
     assert live.end() == 0
 

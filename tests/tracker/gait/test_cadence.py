@@ -93,6 +93,13 @@ def test_bursts_of_various_sizes_are_no_gaps() -> None:
     assert status.lost < 0.01 * len(stamps)
 
 
+def test_a_source_that_loses_most_of_its_samples_is_no_source_of_bursts() -> None:
+    kept = [sample for sample in range(20_000) if sample < 200 or sample % 100 < 10]
+    status = tick([float(sample) for sample in kept]).status()
+    assert status.rate == pytest.approx(1000.0)
+    assert status.lost == kept[-1] + 1 - len(kept)
+
+
 def flushed(count: int, largest: int, seed: int) -> list[float]:
     """Stamps [ms] of samples at 200 Hz that arrive together with however many came before, up to `largest`."""
     random_size, stamps, sample = random.Random(seed), list[float](), 0
