@@ -5,7 +5,7 @@ is a function of θ2 there, so three coordinates are left, not the paper's four 
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,11 +39,11 @@ class NoReturnError(ValueError):
 class SectionState(NamedTuple):
     """The pair at the instant before a strike of the front wheel."""
 
-    omega1: Any
+    omega1: float
     """[rad/s]"""
-    theta2: Any
+    theta2: float
     """[rad]"""
-    omega2: Any
+    omega2: float
     """[rad/s]"""
 
 
@@ -199,7 +199,7 @@ class ReturnMap:
             raise ValueError(f'phase must be in [0, 1), got {phase}')
         return SectionState(*starts(self.rig, phase)[1:].tolist())
 
-    def phase(self, state: SectionState) -> Any:
+    def phase(self, state: SectionState) -> float:
         """The gait phase difference p at the section, in steps; the goal is 0.5."""
         return 0.5 - state.theta2 / (2.0 * self.rig.rear.alpha)
 

@@ -155,7 +155,7 @@ def judge(
 
 
 @compiled
-def _judge(
+def _judge(  # Any: the arrays of Ensemble, Judgement and Sections, which mypy cannot unpack one by one
     strikes: Any,
     strike_counts: Any,
     ends: Any,
