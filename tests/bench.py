@@ -19,8 +19,8 @@ from dcdrw_msgs_py.executor import StreamExecutor
 from dcdrw_msgs_py.node import advertise, message_type
 from dcdrw_msgs_py.topics import Topic
 
-PATIENCE = 20.0
-"""Limit of every wait [s]: discovery alone can take seconds on a busy machine."""
+PATIENCE = 60.0
+"""Limit of every wait [s]: for what hangs; on a busy machine discovery alone can take many seconds."""
 
 
 class Bench:

@@ -13,7 +13,7 @@ from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, PHASE_STATE, SYNC_ERROR_PERCENT, SYNC_STATE, SYNCHRONIZED
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatorParams
-from tests.bench import Bench
+from tests.bench import PATIENCE, Bench
 
 pytestmark = pytest.mark.processes
 
@@ -88,7 +88,7 @@ def test_killed_simulator_is_stale_and_a_new_one_is_judged_afresh(bench):
     bench.wait(lambda: pair() is PairState.SYNCHRONIZED, 'a diagnosis that says so')
 
     simulator.send_signal(signal.SIGKILL)
-    simulator.wait(10)
+    simulator.wait(PATIENCE)
     bench.wait(lambda: not verdicts[-1].data, 'the end of the verdict')
     bench.wait(lambda: pair() is PairState.NO_DATA, 'no data')
 

@@ -18,7 +18,7 @@ from dcdrw_msgs_py.node import FRESH, OLD, Inbox, dropped, listen, steady_clock
 from dcdrw_msgs_py.topics import PHI
 
 pytestmark = pytest.mark.processes
-PATIENCE = 30.0
+PATIENCE = 60.0
 
 
 class Pair:

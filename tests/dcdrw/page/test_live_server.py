@@ -22,7 +22,7 @@ pytestmark = pytest.mark.processes
 
 TOKEN = 'a-token-of-tests'
 KEPT = 5
-PATIENCE = 20.0
+PATIENCE = 60.0
 
 
 class Served:

@@ -24,7 +24,7 @@ from dcdrw_msgs_py.topics import (
 )
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatorParams
-from tests.bench import Bench
+from tests.bench import PATIENCE, Bench
 
 pytestmark = pytest.mark.processes
 
@@ -239,7 +239,7 @@ def test_as_fast_as_possible_outruns_the_clock(bench):
 )
 def test_impossible_parameters_end_it_with_one_line(bench, parameters, message):
     process = bench.start('simulator', **parameters)
-    assert process.wait(20) == 2
+    assert process.wait(PATIENCE) == 2
     assert message in bench.output('simulator')
     assert 'Traceback' not in bench.output('simulator')
 

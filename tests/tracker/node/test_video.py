@@ -13,7 +13,7 @@ from dcdrw_tracker.node.frame_thread import FrameThread, Slot
 from dcdrw_tracker.node.video import CameraDevice, VideoFile, is_device
 
 cv2 = pytest.importorskip('cv2')
-PATIENCE = 20.0
+PATIENCE = 60.0
 
 
 def grey(index):
