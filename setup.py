@@ -1,3 +1,5 @@
+"""Builds and installs the package, by pip and by colcon alike; metadata is in setup.cfg."""
+
 from glob import glob
 
 from setuptools import setup

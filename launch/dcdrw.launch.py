@@ -3,14 +3,17 @@
 from pathlib import Path
 
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, EmitEvent, ExecuteProcess, OpaqueFunction, RegisterEventHandler
+from launch.event_handlers import OnProcessExit
+from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import ExecutableInPackage, FindPackageShare
 
 from dcdrw.commands.urdf import make_urdf
-from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
+from dcdrw.suite.hub_gains import hub_gains
+from dcdrw.suite.parameter_file import TrialParams, given, read_parameter_file
 
 SOURCES = ('sim', 'rig', 'legs', 'recording')
 SWITCH = ('true', 'false')
@@ -55,6 +58,17 @@ ARGUMENTS = {
         "plan the robot's legs a quarter stride ahead of the person's: of legs, or of the front wheel",
         SWITCH,
     ),
+    'on_exit': (
+        'ignore',
+        'when a node ends: ignore, the others go on; end, they end too; respawn, it starts again after a second',
+        ('ignore', 'end', 'respawn'),
+    ),
+    'synchronizer': ('false', 'run the synchronizer, idle until enabled; its gains from params_file', SWITCH),
+    'person': (
+        'false',
+        'sim: the front wheel walks as a person does, and the synchronizer drives the rear hub while it is enabled',
+        SWITCH,
+    ),
     'markers': ('false', 'draw the rig for RViz and Foxglove; rviz implies it', SWITCH),
     'rviz': ('false', 'show the rig in RViz, with its URDF in robot_state_publisher (needs both packages)', SWITCH),
 }
@@ -68,12 +82,15 @@ def _actions(context):
         raise ValueError('source:=recording needs recording:=FOLDER')
     simulated = source == 'recording' or (source == 'sim' and (on['simulated_time'] or bool(pace)))
 
+    person = source == 'sim' and on['person']
+    gains = _hub_gains(chosen) if person else {}
+
     def node(name, **parameters):
         return start(name, name, parameters)
 
     def hosted():
         """Several nodes in one process: each keeps its own name."""
-        return start('suite', None, {})
+        return start('suite', None, gains)
 
     def start(executable, name, parameters):
         file = [chosen['params_file']] if chosen['params_file'] else []
@@ -84,6 +101,8 @@ def _actions(context):
             namespace=chosen['namespace'],
             output='screen',
             parameters=[*file, {'use_sim_time': simulated, **parameters}],
+            respawn=chosen['on_exit'] == 'respawn',
+            respawn_delay=1.0,
         )
 
     def texts(**arguments):
@@ -94,15 +113,15 @@ def _actions(context):
             if chosen[argument]
         }
 
-    def command(name, *arguments):
-        namespace = ['--namespace', chosen['namespace']] if chosen['namespace'] else []
-        return ExecuteProcess(
-            cmd=[ExecutableInPackage('dcdrw', 'dcdrw'), name, *arguments, *namespace], output='screen'
-        )
+    def command(name, *arguments, namespace='--namespace'):
+        space = [namespace, chosen['namespace']] if chosen['namespace'] else []
+        return ExecuteProcess(cmd=[ExecutableInPackage('dcdrw', 'dcdrw'), name, *arguments, *space], output='screen')
 
     # First what may not be installed: a launch that fails must not leave nodes behind.
     actions = _rviz(chosen, simulated) if on['rviz'] else []
     actions += [hosted()] if on['one_process'] else [node('sync_monitor'), node('phase_estimator')]
+    if (on['synchronizer'] or person) and not on['one_process']:  # which hosts it anyway
+        actions.append(node('synchronizer', **gains))
     if on['record'] or on['live']:
         actions.append(node('recorder', record=on['record'], **texts(folder='folder')))
     if on['markers'] or on['rviz']:
@@ -116,19 +135,44 @@ def _actions(context):
     elif source == 'legs':
         actions.append(node('leg_tracker'))
     elif source == 'recording':
-        actions.append(command('replay', chosen['recording'], *(['--rate', pace] if pace else [])))
+        rate = ['--rate', pace] if pace else []
+        actions.append(command('replay', chosen['recording'], *rate, namespace='--into'))
     else:
         numbers = {name: float(chosen[name]) for name in ('initial_phase_percent', 'real_time_factor') if chosen[name]}
-        actions.append(node('simulator', use_sim_time=False, publish_clock=simulated, **numbers))
-    return actions
+        walk = {'person.walks': True} if person else {}
+        actions.append(node('simulator', use_sim_time=False, publish_clock=simulated, **numbers, **walk))
+    return [*actions, *map(_ends_all, actions)] if chosen['on_exit'] == 'end' else actions
+
+
+def _ends_all(action):
+    """Ends the launch when this process has ended; with a status other than 0, the reason says so."""
+    return RegisterEventHandler(
+        OnProcessExit(
+            target_action=action,
+            on_exit=lambda event, _: EmitEvent(
+                event=Shutdown(reason=f'{event.process_name} ended with status {event.returncode}')
+            ),
+        )
+    )
+
+
+def _trial_params(chosen):
+    file = chosen['params_file']
+    return read_parameter_file(Path(file), TrialParams(), chosen['namespace']) if file else TrialParams()
+
+
+def _hub_gains(chosen):
+    """What makes the synchronizer drive the rear hub: for this rig, as `dcdrw trial --person` does."""
+    return {
+        'law': 'rear',
+        **{f'hub.{name}': value for name, value in given(hub_gains(_trial_params(chosen).rig)).items()},
+    }
 
 
 def _rviz(chosen, simulated):
     """RViz, and the URDF's transforms. Only the simulator is sure to tell the coupler's length."""
-    namespace, rig = chosen['namespace'], TrialParams()
-    if chosen['params_file']:
-        rig = read_parameter_file(Path(chosen['params_file']), rig)
-    urdf = make_urdf(rig, fixed_coupler=chosen['source'] != 'sim')
+    namespace = chosen['namespace']
+    urdf = make_urdf(_trial_params(chosen), fixed_coupler=chosen['source'] != 'sim')
     config = PathJoinSubstitution([FindPackageShare('dcdrw'), 'rviz', 'dcdrw.rviz'])
     return [
         Node(

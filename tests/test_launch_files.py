@@ -56,12 +56,15 @@ def started():
         context.launch_configurations.update(arguments)
         actions = module['_actions'](context)
         nodes = [action for action in actions if isinstance(action, launch_ros.actions.Node)]
+        handlers = [action for action in actions if isinstance(action, launch.actions.RegisterEventHandler)]
         return {
             'nodes': [node.node_executable for node in nodes],
+            'respawned': [node.node_executable for node in nodes if node._ExecuteLocal__respawn],
+            'ending_all': len(handlers),
             'commands': [
                 [launch.utilities.perform_substitutions(context, part) for part in action.cmd[1:]]
                 for action in actions
-                if action not in nodes
+                if action not in [*nodes, *handlers]
             ],
         }
 
@@ -95,8 +98,27 @@ def test_a_recording_takes_the_place_of_the_simulator(started):
     running = started(source='recording', recording='day/7', real_time_factor='2')
     assert set(running['nodes']) == CORE
     assert running['commands'] == [['replay', 'day/7', '--rate', '2']]
+    spaced = started(source='recording', recording='day/7', namespace='lab')
+    assert spaced['commands'] == [['replay', 'day/7', '--into', 'lab']]
     with pytest.raises(ValueError, match='needs recording:='):
         started(source='recording')
+
+
+def test_a_node_that_ends_ends_all_or_starts_again_as_an_argument_says(started):
+    assert (started()['respawned'], started()['ending_all']) == ([], 0)
+    assert set(started(on_exit='respawn')['respawned']) == {*CORE, 'simulator'}
+    assert started(on_exit='end', live='true')['ending_all'] == 5  # simulator, estimator, monitor, recorder, page
+
+
+def test_a_person_in_front_comes_with_the_synchronizer(started):
+    assert set(started(person='true', xrl_reference='true')['nodes']) == {
+        *CORE,
+        'simulator',
+        'synchronizer',
+        'xrl_reference',
+    }
+    assert set(started(person='true', one_process='true')['nodes']) == {'suite', 'simulator'}
+    assert set(started(synchronizer='true')['nodes']) == {*CORE, 'simulator', 'synchronizer'}
 
 
 def test_a_rig_is_seen_by_the_tag_tracker(started):

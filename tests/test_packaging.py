@@ -2,6 +2,7 @@
 
 import ast
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -18,29 +19,27 @@ from tests import ROOT
 
 PACKAGES = ('dcdrw_msgs_py', 'dcdrw_sim', 'dcdrw_tracker', 'dcdrw_control', 'dcdrw')
 COMMANDS = set(entry.EXECUTABLES)
-# Third-party modules and the package.xml key (rosdep) that brings each.
+# Third-party modules and the package.xml key (rosdep) that brings each; those without a key come from PyPI alone.
 KEYS = {
     'aiohttp': 'python3-aiohttp',
     'argcomplete': 'python3-argcomplete',
     'cv2': 'python3-opencv',
+    'dask': None,
+    'distributed': None,
+    'llvmlite': 'python3-numba',
+    'lz4': 'mcap-ros2-support',
     'matplotlib': 'python3-matplotlib',
+    'mcap': 'mcap-ros2-support',
+    'netCDF4': 'python3-netcdf4',
+    'numba': 'python3-numba',
     'numpy': 'python3-numpy',
+    'pupil_apriltags': None,
     'rich': 'python3-rich',
+    'rosbags': 'python3-rosbags-pip',
     'scipy': 'python3-scipy',
+    'xarray': None,
     'yaml': 'python3-yaml',
-}
-OPTIONAL = {
-    'dask',
-    'distributed',
-    'netCDF4',
-    'llvmlite',
-    'lz4',
-    'mcap',
-    'numba',
-    'pupil_apriltags',
-    'rosbags',
-    'xarray',
-    'zstandard',
+    'zstandard': 'mcap-ros2-support',
 }
 
 
@@ -63,12 +62,13 @@ def imported() -> set[str]:
                 names |= {alias.name.split('.')[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom):
                 names.add((node.module or '').split('.')[0])
-    return names - set(sys.stdlib_module_names) - set(PACKAGES) - OPTIONAL
+    return names - set(sys.stdlib_module_names) - set(PACKAGES)
 
 
 def test_dependencies_are_exactly_what_is_imported():
     named_in_topics = {'std_msgs', 'sensor_msgs', 'geometry_msgs', 'diagnostic_msgs', 'rosgraph_msgs'}
-    needed = {KEYS.get(name, name) for name in imported() | named_in_topics} | {'ros2launch'}
+    launched = set(re.findall("package='([^']+)'", (ROOT / 'launch/dcdrw.launch.py').read_text())) - {'dcdrw'}
+    needed = {KEYS.get(name, name) for name in imported() | named_in_topics} - {None} | launched | {'ros2launch'}
     assert {element.text for element in manifest().findall('exec_depend')} == needed
 
 
