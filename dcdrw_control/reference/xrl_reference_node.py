@@ -22,7 +22,7 @@ from dcdrw_control.reference.plan import TICK_NS, Trajectory
 from dcdrw_control.reference.reference import LegReference
 from dcdrw_msgs_py.diagnosis import Diagnosis
 from dcdrw_msgs_py.messages import PhaseSampleReader, stamp_ns, to_stamp, turns_message
-from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, report, run
+from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, publish_diagnosis, run
 from dcdrw_msgs_py.samples import SECOND, Turn
 from dcdrw_msgs_py.topics import (
     ENABLE,
@@ -59,7 +59,7 @@ class XrlReferenceNode(Node):
         else:
             reader, wheels = PhaseSampleReader(), WheelGait(params.front.alpha, params.rear.alpha)
             listen(self, PHASE_STATE, self._reading(lambda message: wheels.read(reader.read(message))))
-        report(self, self._diagnose)
+        publish_diagnosis(self, self._diagnose)
 
     def _reading(self, read: Callable[[Any], GaitSample | None]) -> Callable[[Any], None]:
         """What takes the messages of a topic."""
