@@ -15,6 +15,7 @@ from dcdrw.drawings.figure_files import add_formats, figure_files, write_figure
 from dcdrw.files import add_force, refuse_existing
 from dcdrw_msgs_py.in_step import BAND_PERCENT
 from dcdrw_sim.figures import model_figures, regime_figures, sweep_figures
+from dcdrw_sim.figures.riddle_figure import draw_riddle
 from dcdrw_sim.figures.style import COLUMN, PAGE, for_print, new_figure
 from dcdrw_sim.map.return_map import ReturnMap
 from dcdrw_sim.model.presets import preset
@@ -205,6 +206,13 @@ def _pair(book: Book) -> Any:
     return figure
 
 
+def _riddle(book: Book) -> Any:
+    """What would explain the paper's 7 steps, and what a longer trial would show."""
+    figure = new_figure(PAGE, 3.2)
+    draw_riddle(*figure.subplots(1, 2, sharey=True))
+    return figure
+
+
 FIGURES: dict[str, Callable[[Book], Any]] = {
     'trajectories': _trajectories,
     'eigenvalues': _eigenvalues,
@@ -213,6 +221,7 @@ FIGURES: dict[str, Callable[[Book], Any]] = {
     'regimes': _regimes,
     'basin': _basin,
     'pair': _pair,
+    'riddle': _riddle,
 }
 
 
