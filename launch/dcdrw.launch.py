@@ -58,6 +58,7 @@ ARGUMENTS = {
         "plan the robot's legs a quarter stride ahead of the person's: of legs, or of the front wheel",
         SWITCH,
     ),
+    'enclaves': ('false', 'each node in the SROS2 enclave /dcdrw/NAME (see docs/security.md)', SWITCH),
     'on_exit': (
         'ignore',
         'when a node ends: ignore, the others go on; end, they end too; respawn, it starts again after a second',
@@ -101,6 +102,7 @@ def _actions(context):
             namespace=chosen['namespace'],
             output='screen',
             parameters=[*file, {'use_sim_time': simulated, **parameters}],
+            ros_arguments=['--enclave', f'/dcdrw/{executable}'] if on['enclaves'] else None,
             respawn=chosen['on_exit'] == 'respawn',
             respawn_delay=1.0,
         )
