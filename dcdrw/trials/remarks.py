@@ -50,6 +50,8 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         yield Remark(
             f'{_number_of(estimator.unstamped, "joint state")} had no stamp: the time of recording took its place.'
         )
+    if estimator.duplicates:
+        yield Remark(f'{_number_of(estimator.duplicates, "joint state")} came again as they were, and count once.')
     for step in estimator.clock_steps:
         yield Remark(
             f'The clock of the source was set by {step.seconds:+.3g} s while the wheels rolled on; '

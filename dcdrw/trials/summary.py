@@ -28,6 +28,8 @@ class Samples(NamedTuple):
     """Times that the clock of the source was set, which are undone."""
     unstamped: int
     """Without a stamp, so that the time of recording took its place."""
+    duplicates: int
+    """Joint states that came again as they were, which costs nothing."""
     rollovers: int
     """Times that the counter of an encoder rolled over, which is made good."""
     hints: tuple[Hint, ...]
@@ -113,6 +115,7 @@ def summarize(trial: Analysis) -> Summary:
             restarts=trial.estimator.restarted,
             clock_steps=trial.estimator.clock_steps,
             unstamped=trial.estimator.unstamped,
+            duplicates=trial.estimator.duplicates,
             rollovers=trial.estimator.rollovers,
             hints=trial.estimator.hints,
         ),

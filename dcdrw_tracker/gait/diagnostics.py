@@ -84,6 +84,7 @@ def diagnose_phase(status: PhaseStatus, age: float, stale_after: float) -> Diagn
             **{f'{REFUSED}: {why}': count for why, count in status.refused.items()},
             RESTARTS: status.restarts,
             'samples without a stamp': status.unstamped,
+            'samples that came twice': status.duplicates,
             'times the clock of the source was set': len(status.clock_steps),
             'times the counter of an encoder rolled over': status.rollovers,
             **_stream(status.cadence, age),
@@ -134,6 +135,7 @@ HINTS: dict[Hint, str] = {
     'rear_sign': 'the rear wheel rolls uphill: is its sign right? (parameter rear_sign)',
     'rollover': "an encoder's counter rolls over within a turn, perhaps also before the start: where is its zero? "
     '(parameter rollover, which takes a start in its upper half for one below 0)',
+    'revolutions': 'the wheels turn slower than they can roll: are their rotations in revolutions? (parameter unit)',
     'unit': 'the wheels turn faster than they can roll: are their rotations in degrees? (parameter unit)',
 }
 """What makes a parameter seem wrong."""

@@ -23,7 +23,7 @@ is not a number, the stamp stands still, goes back or lies ahead of the clock, o
 Cause = Literal['announced', 'stamp', 'rotation']
 """Why the source is taken to have started anew: it says so, its stamps went back, or its rotations jumped."""
 
-Hint = Literal['front_sign', 'rear_sign', 'unit', 'rollover']
+Hint = Literal['front_sign', 'rear_sign', 'unit', 'revolutions', 'rollover']
 """A parameter that is probably set wrongly, judged by how the wheels seem to turn."""
 
 LARGEST_ROTATION = 1e9
@@ -36,6 +36,8 @@ REMEMBERED = 100
 """Restarts and clock steps of which the particulars are kept."""
 LEAST_CLOCK_STEP_NS = 500_000_000
 """A jump of the stamps by less is as good as a gap."""
+MANY_SLOW = 5
+"""So many strikes, and no other, of wheels that turn slower than any that rolls by itself make the unit doubtful."""
 MOVING = 0.2
 """A wheel that is slower tells nothing about the clock [rad/s]."""
 
@@ -140,6 +142,8 @@ class PhaseStatus(NamedTuple):
     """Times that the counter of an encoder rolled over, which was made good."""
     unstamped: int = 0
     """Samples whose stamp was missing (zero), so that the time of their arrival took its place."""
+    duplicates: int = 0
+    """Samples that came again as they were, and so cost nothing."""
     clock_steps: tuple[ClockStep, ...] = ()
     """The last of them, which were bridged: nothing was lost."""
     restarted: tuple[Restart, ...] = ()
@@ -169,7 +173,8 @@ class PhaseEstimator:
         self._cadence = Cadence()
         self._refused: dict[Refusal, int] = dict.fromkeys(get_args(Refusal), 0)
         self._refusal: Refusal | None = None
-        self._accepted = self._unstamped = self._too_fast = 0
+        self._accepted = self._unstamped = self._duplicates = self._too_fast = 0
+        self._slow_strikes: int | None = 0
         self._restarts = self._rolled_before = 0
         self._restarted: deque[Restart] = deque(maxlen=REMEMBERED)
         self._clock_steps: deque[ClockStep] = deque(maxlen=REMEMBERED)
@@ -249,6 +254,10 @@ class PhaseEstimator:
                     self._arrived_ns = arrival_ns
                     return update
             return self._hold(joints, 'outlier', arrival_ns)
+        if elapsed_ns == 0 and joints[1:3] == last[1:3]:
+            self._duplicates += 1
+            self._refusal = 'repeated'
+            return None
         if elapsed_ns == 0 or (self._held and stamp_ns == self._held[-1].joints.stamp_ns):
             self.refuse('repeated')
             return None
@@ -268,6 +277,7 @@ class PhaseEstimator:
             rear_steps=self._rear.steps,
             rollovers=self._rolled_before + self._front.rollovers + self._rear.rollovers,
             unstamped=self._unstamped,
+            duplicates=self._duplicates,
             clock_steps=tuple(self._clock_steps),
             restarted=tuple(self._restarted),
             hints=self._hints(),
@@ -281,6 +291,8 @@ class PhaseEstimator:
         )
         if swift or self._too_fast > max(2 * self.params.restart_samples, self._accepted // 4):
             hints.append('unit')
+        if self._slow_strikes is not None and self._slow_strikes > MANY_SLOW:
+            hints.append('revolutions')
         if self._front.steps <= -UPHILL_STEPS:
             hints.append('front_sign')
         if self._rear.steps <= -UPHILL_STEPS:
@@ -341,6 +353,12 @@ class PhaseEstimator:
         front_strikes = front.advance(stamp_ns, front_raw.angle, front_psi, self._speed(front_raw), tolerance, burst)
         rear_strikes = rear.advance(stamp_ns, rear_raw.angle, rear_psi, self._speed(rear_raw), tolerance, burst)
         footfalls = self._footfalls(front_strikes, rear_strikes) if front_strikes or rear_strikes else ()
+        if footfalls and self._slow_strikes is not None:
+            slow = all(
+                abs(wheel.pace) < 0.5 * _slowest_rolling(wheel.alpha, shape)
+                for wheel, shape in ((front, self.params.front), (rear, self.params.rear))
+            )
+            self._slow_strikes = self._slow_strikes + len(footfalls) if slow else None
         return PhaseUpdate(self._take(joints), footfalls, self._clock_ns)
 
     def _take(self, joints: JointSample) -> PhaseSample:
@@ -524,6 +542,14 @@ def _scaled(turn: Turn, scale: float) -> Turn:
 def _fastest_rolling(shape: WheelShape) -> float:
     """Twice the speed at which a wheel would leave the ground, ω² ℓ = g: none that rolls is faster [rad/s]."""
     return 2.0 * math.sqrt(RigParams().gravity / shape.length)
+
+
+def _slowest_rolling(alpha: float, shape: WheelShape) -> float:
+    """The speed after a strike of a wheel that just passes its apex: a slower one does not roll by itself [rad/s].
+
+    ω² ℓ = 2 g (1 − cos α) before the strike, which keeps cos 2α of it.
+    """
+    return math.cos(2.0 * alpha) * math.sqrt(2.0 * RigParams().gravity / shape.length * (1.0 - math.cos(alpha)))
 
 
 def _distance(one: JointSample, other: JointSample) -> float:

@@ -141,6 +141,26 @@ def test_samples_in_bursts_give_the_same_verdict(size):
     assert summary.final_band_percent == pytest.approx(alone.final_band_percent, abs=0.1)
 
 
+def test_joint_states_that_come_twice_cost_nothing():
+    summary = summarize(trial([sample for sample in WALK for _ in range(2)]))
+    assert (summary.samples.duplicates, summary.samples.refused, summary.complete) == (len(WALK), {}, True)
+    assert f'{len(WALK)} joint states came again as they were, and count once.' in summary.sentence
+    assert summary.steps_to_synchronization == summarize(trial(WALK)).steps_to_synchronization
+
+
+def test_rotations_in_revolutions_bring_a_hint_at_the_unit():
+    turns = [
+        sample._replace(
+            **{wheel: Turn(*(value / math.tau for value in getattr(sample, wheel))) for wheel in ('front', 'rear')}
+        )
+        for sample in WALK
+    ]
+    summary = summarize(trial(turns))
+    assert (summary.samples.hints, summary.complete) == (('revolutions',), False)
+    assert 'in revolutions? (parameter unit)' in summary.sentence
+    assert summarize(trial(WALK)).samples.hints == ()
+
+
 def test_a_single_sample_of_use_is_no_trial():
     stuck = [sample._replace(stamp_ns=WALK[0].stamp_ns) for sample in WALK]
     summary = summarize(trial(stuck))
