@@ -41,7 +41,7 @@ def find_bag(path: Path) -> Bag:
     if not path.exists():
         raise ValueError(f'{path} does not exist')
     if not path.is_dir():
-        if not is_storage(path):
+        if not (path.is_file() and is_storage(path)):  # a pipe would keep its reader waiting
             raise ValueError(
                 f'{path} is not a recording: give its folder, or a file that ends in {", ".join(STORAGES)}, '
                 f'or one of these and {COMPRESSIONS[0]}'

@@ -37,7 +37,7 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
             REFUSALS[why] if count == refused else f'{count} times {REFUSALS[why]}'
             for why, count in estimator.refusals.items()
         )
-        of = estimator.accepted + refused
+        of = estimator.accepted + estimator.duplicates + refused
         yield Remark(f'{refused} of {of} joint states were refused: {reasons}.', True)
     if cadence.lost:
         yield Remark(

@@ -129,7 +129,7 @@ class PhaseStatus(NamedTuple):
     """Stamp of the last sample that was accepted; 0 where there was none."""
     accepted: int
     refused: dict[Refusal, int]
-    """How many were refused for good, by the reason; with `accepted` they are all that came."""
+    """How many were refused for good, by the reason; with those accepted and the duplicates, all that came."""
     refusal: Refusal | None
     """Why samples are refused now; None since one was accepted."""
     cadence: CadenceStatus

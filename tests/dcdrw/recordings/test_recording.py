@@ -1,5 +1,6 @@
 """Recordings, whoever made them and however they ended."""
 
+import os
 import re
 import shutil
 import sqlite3
@@ -491,3 +492,9 @@ def test_rows_of_sqlite_without_a_possible_time_cost_themselves_alone(tmp_path, 
         times = [message.log_ns for message in recording.messages(['/joint_states'])]
         assert times == [10**18 + k * 10**7 for k in range(20) if k != 6]
         assert recording.damage
+
+
+def test_a_pipe_is_no_recording_and_keeps_nobody_waiting(tmp_path):
+    os.mkfifo(tmp_path / 'pipe.mcap')
+    with pytest.raises(ValueError, match=r'pipe\.mcap is not a recording'):
+        Recording(tmp_path / 'pipe.mcap')
