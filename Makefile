@@ -14,7 +14,7 @@ endif
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: help trial test fuzz lint format bench clean
+.PHONY: help trial test fuzz lint format bench docs dist clean
 help:
 	@echo 'make trial   run the paper'"'"'s trial in simulation and draw it (into trials/)'
 	@echo 'make test    run every test'
@@ -22,6 +22,8 @@ help:
 	@echo 'make lint    ruff and mypy --strict'
 	@echo 'make format  ruff format'
 	@echo 'make bench   print the tables of speed (minutes)'
+	@echo 'make docs    the documentation as a site, into build/docs'
+	@echo 'make dist    wheel and source distribution, into dist'
 	@echo 'make clean   remove what was made here; trials stay'
 
 trial: $(READY)
@@ -52,13 +54,28 @@ format: $(READY)
 bench: $(READY)
 	@for table in benchmarks/*.py; do echo; echo "$$table"; $(BIN)/python $$table || exit; done
 
+# A warning is an error: a broken link, a docstring that is not read as it is meant.
+docs: $(VENV)/.docs
+	@rm -rf docs/generated build/docs
+	@$(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --quiet --jobs auto docs build/docs
+	@echo 'build/docs/index.html'
+
+dist: $(VENV)/.dist
+	@rm -rf build/lib dist
+	@$(BIN)/python -m build --outdir dist .
+
+$(VENV)/.docs $(VENV)/.dist: $(READY)
+	@echo 'Installing what make $(subst .,,$(@F)) needs (once) ...'
+	@$(BIN)/python -m pip install --disable-pip-version-check -e '.[$(subst .,,$(@F))]'
+	@touch $@
+
 $(READY): setup.cfg setup.py
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; (3, 10) <= v <= (3, 13) or sys.exit(f"python3 is {v[0]}.{v[1]}; rclpy needs 3.10 to 3.13: make PYTHON=python3.12 ...")'
-	@echo 'Setting up $(VENV) (once) ...'
+	@echo 'Setting up $(VENV) (once): numpy, scipy and what these need: $(EXTRAS) ...'
 	@$(PYTHON) -m venv $(VENV_FLAGS) $(VENV)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(EXTRAS)]'
+	@$(BIN)/python -m pip install --disable-pip-version-check -e '.[$(EXTRAS)]'
 	@touch $@
 
 clean:
-	rm -rf .venv .venv-* build install log *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-* build dist docs/generated install log *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

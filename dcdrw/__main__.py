@@ -4,4 +4,5 @@ import sys
 
 from dcdrw.entry import run
 
-sys.exit(run('dcdrw'))
+if __name__ == '__main__':
+    sys.exit(run('dcdrw'))

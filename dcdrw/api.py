@@ -158,7 +158,13 @@ def return_map(rig: RigParams | None = None) -> ReturnMap:
     return ReturnMap(rig or preset('paper'))
 
 
-def sweep(rig: RigParams | None = None, x: str | Axis = 'k', y: str | Axis = 'b', seconds: float | None = None) -> Any:
+def sweep(
+    rig: RigParams | None = None,
+    x: str | Axis = 'k',
+    y: str | Axis = 'b',
+    seconds: float | None = None,
+    trajectories: bool = False,
+) -> Any:
     """Judge a rig over any two of its parameters, from nine starts at each point, as an xarray Dataset.
 
     Args:
@@ -166,13 +172,14 @@ def sweep(rig: RigParams | None = None, x: str | Axis = 'k', y: str | Axis = 'b'
         x: an axis, or its text NAME:LOW:HIGH:COUNT[:log]; 'k' and 'b' alone mean the paper's range.
         y: likewise.
         seconds: how long to simulate; by default 200 √(ℓ/g), the paper's.
+        trajectories: keep the states at each section, which the paper's figures show.
 
     Raises:
         ValueError: an impossible axis or rig, or xarray is missing.
 
     """
     rig = rig or preset('paper-sweep')
-    asked = Sweep(rig, _axis(x, rig), _axis(y, rig), seconds or default_seconds(rig), trajectories=False)
+    asked = Sweep(rig, _axis(x, rig), _axis(y, rig), seconds or default_seconds(rig), trajectories=trajectories)
     check_sweep(asked)
     along_x, along_y = asked.shape
     return to_dataset(asked, compute(asked, (slice(0, along_x), slice(0, along_y))))

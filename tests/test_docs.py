@@ -1,10 +1,155 @@
-"""The docs say what the code does."""
+"""The docs say what the code does: their commands, examples, links and tables."""
+
+import re
+import runpy
+import shlex
+import shutil
+from configparser import ConfigParser
 
 import pytest
 
+from dcdrw.cli import COMMANDS, main
+from dcdrw.command_line import CommandLine
+from dcdrw.suite.executables import EXECUTABLES
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw.suite.tables import updated
+from dcdrw_msgs_py.quantity import fields
 from tests import ROOT
+from tests.snippets import ELSEWHERE, PAGES, blocks, commands, inline, targets
+
+QUICK = {'legs', 'map', 'simulate', 'tags', 'urdf'}
+"""Commands that are run as they stand in the docs; of the other ones the arguments are read, and their own tests run them."""
+NODES = {node.name: {field.name for params in node.parameters for field in fields(params)} for node in EXECUTABLES}
+TOPICS = {topic.name.lstrip('/'): topic.type for node in EXECUTABLES for topic in (*node.subscribes, *node.publishes)}
+SERVICES = {
+    f'/{node.name}/{name}': type_.rstrip(')')
+    for node in EXECUTABLES
+    for name, type_ in (service.removeprefix('~/').split(' (') for service in node.services)
+}
+STANDING = list(commands())
+
+
+def dcdrw(words: list[str]) -> None:
+    _, unknown = CommandLine(COMMANDS, '', '').parser.parse_known_args(words)
+    assert not unknown
+
+
+def ros2(words: list[str]) -> None:
+    match words:
+        case ['run', 'dcdrw', 'dcdrw', *rest]:
+            dcdrw(rest)
+        case ['run', 'dcdrw', node, *rest]:
+            assert node in {*NODES, 'suite'}
+            for before, assignment in zip(rest, rest[1:], strict=False):
+                if before == '-p':
+                    assert assignment.split(':=')[0] in NODES[node]
+        case ['launch', 'dcdrw', file, *rest]:
+            assert (ROOT / 'launch' / file).exists()
+            text = (ROOT / 'launch' / 'dcdrw.launch.py').read_text(encoding='utf-8')
+            for argument in rest:
+                assert argument == '--show-args' or f"    '{argument.split(':=')[0]}': (" in text
+        case ['topic', *_]:
+            (topic,) = (word for word in words if word.startswith('/'))
+            kind = [word for word in words if '/msg/' in word]
+            assert kind in ([], [TOPICS[topic.lstrip('/')]])
+        case ['service', 'call', service, kind, *_]:
+            assert SERVICES[service] == kind
+        case ['param', 'set', node, name, _]:
+            assert name in NODES[node.lstrip('/')]
+        case [('run' | 'pkg'), *_]:  # another package's, which is not here
+            pass
+        case _:
+            raise AssertionError('what does ros2 do with this?')
+
+
+def make(words: list[str]) -> None:
+    assert re.search(rf'^{words[0]}:', (ROOT / 'Makefile').read_text(encoding='utf-8'), re.MULTILINE)
+
+
+def pip(words: list[str]) -> None:
+    setup = ConfigParser()
+    setup.read(ROOT / 'setup.cfg')
+    for extras in re.findall(r'\[(.*?)\]', ' '.join(words)):
+        known = {'distributed', *setup['options.extras_require']}
+        assert set(extras.split(',')) <= known
+
+
+def python(words: list[str]) -> None:
+    assert (ROOT / words[0]).exists()
+
+
+READERS = {'dcdrw': dcdrw, 'ros2': ros2, 'make': make, 'pip': pip, 'python': python}
+
+
+@pytest.mark.parametrize(('snippet', 'words'), STANDING, ids=[str(snippet) for snippet, _ in STANDING])
+def test_every_command_takes_its_arguments(snippet, words, capsys):
+    program = words[0].removeprefix('.venv/bin/')
+    if program not in READERS:
+        assert program in ELSEWHERE or program.startswith('share=') or program == 'pre-commit'
+        return
+    status: object = None
+    try:
+        READERS[program](words[1:])
+    except SystemExit as end:  # by --help, or by what the parser refuses
+        status = end.code
+    assert not status, capsys.readouterr().err
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
+def test_quick_commands_of_a_page_run(page, tmp_path, monkeypatch, capsys):
+    (tmp_path / 'tests').symlink_to(ROOT / 'tests')
+    shutil.copy(ROOT / 'config' / 'rig.yaml', tmp_path / 'my_rig.yaml')
+    shutil.copy(ROOT / 'tests' / 'data' / 'strikes.json', tmp_path / 'case.json')
+    monkeypatch.chdir(tmp_path)
+    for snippet, words in STANDING:
+        if snippet.page == page and words[0] == 'dcdrw' and words[1] in QUICK:
+            assert main(words[1:]) == 0, (str(snippet), capsys.readouterr().err)
+
+
+def test_commands_within_sentences_exist():
+    known = CommandLine(COMMANDS, '', '').commands
+    for snippet in inline():
+        if snippet.code.startswith('dcdrw ') and not snippet.code.startswith('dcdrw --'):
+            name, *rest = shlex.split(snippet.code)[1:]
+            assert name in known, str(snippet)
+            known[name].load()
+            options = {word.split('=')[0] for word in rest if word.startswith('--')}
+            assert options <= set(known[name].option_strings), str(snippet)
+
+
+def test_links_lead_somewhere():
+    for snippet in targets():
+        file, _, anchor = snippet.code.partition('#')
+        path = snippet.page.parent / file if file else snippet.page
+        assert path.exists(), f'{snippet}: {snippet.code}'
+        if anchor:
+            headings = re.findall(r'^#+ (.*)', path.read_text(encoding='utf-8'), re.MULTILINE)
+            slugs = {re.sub(r'[^\w -]', '', heading.lower()).replace(' ', '-') for heading in headings}
+            assert anchor in slugs, f'{snippet}: {snippet.code}'
+
+
+def test_files_that_are_named_exist():
+    tops = {path.name for path in ROOT.iterdir() if path.is_dir()}
+    for snippet in inline():
+        if re.fullmatch(r'[\w./-]+/[\w-]+\.[a-z]+', snippet.code) and snippet.code.split('/')[0] in tops:
+            assert (ROOT / snippet.code).exists(), f'{snippet}: {snippet.code}'
+
+
+def test_what_takes_a_minute_finds_its_names():
+    for snippet in blocks('python slow'):
+        exec(compile(snippet.code.split('\n\n')[0], str(snippet), 'exec'), {})
+        compile(snippet.code, str(snippet), 'exec')
+
+
+@pytest.mark.parametrize('snippet', list(blocks('python')), ids=str)
+def test_example_runs_as_it_stands(snippet, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'example.py').write_text(snippet.code, encoding='utf-8')
+    runpy.run_path('example.py')
+
+
+def test_readme_is_read_in_a_minute():
+    assert len((ROOT / 'README.md').read_text(encoding='utf-8').splitlines()) <= 150
 
 
 def test_tables_of_the_reference_are_current():

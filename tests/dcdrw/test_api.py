@@ -1,6 +1,5 @@
-"""The package's own names: what a script gets from `import dcdrw`, and every example of its page."""
+"""The package's own names: what a script gets from `import dcdrw`."""
 
-import re
 import subprocess
 import sys
 
@@ -9,8 +8,6 @@ import pytest
 import dcdrw
 from dcdrw import api
 from tests import ROOT
-
-EXAMPLES = re.findall(r'```python\n(.*?)```', (ROOT / 'docs' / 'python.md').read_text(encoding='utf-8'), re.DOTALL)
 
 
 def test_the_package_has_the_names_of_its_api_and_no_other():
@@ -23,12 +20,6 @@ def test_the_package_has_the_names_of_its_api_and_no_other():
 def test_importing_the_package_imports_nothing_heavy():
     code = 'import sys, dcdrw; assert not {"numpy", "scipy", "rclpy"} & set(sys.modules)'
     subprocess.run([sys.executable, '-c', code], check=True, cwd=ROOT)
-
-
-@pytest.mark.parametrize('number', range(len(EXAMPLES)))
-def test_example_of_the_page_runs_as_it_stands(number, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    exec(compile(EXAMPLES[number], f'example {number}', 'exec'), {})
 
 
 def test_the_natural_call_gives_the_trials_answer():

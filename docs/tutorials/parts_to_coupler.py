@@ -1,0 +1,69 @@
+# %% [markdown]
+# # From a parts list to a coupler
+#
+# For a mechanical engineer: which spring and which dashpot to buy for a rig, and how sure one can be. Each step is a
+# command that you can type in a terminal as well; none needs ROS. Run this script in an empty folder.
+
+# %%
+from pathlib import Path
+
+from dcdrw.cli import main as dcdrw
+
+# %% [markdown]
+# ## The parts on sale
+#
+# A table with a row for each part; `value` is N/m of a spring, N·s/m of a dashpot.
+
+# %%
+Path('parts.csv').write_text("""\
+kind,value,name
+spring,16,S-16
+spring,50,S-50
+spring,100,S-100
+dashpot,25,D-25
+dashpot,50,D-50
+dashpot,100,D-100
+""")
+
+# %% [markdown]
+# ## The best pair of them
+#
+# For wheels of 10 kg, 0.9652 m and 12 spokes on 2°. The fastest coupler comes into step from each of nine starts in
+# the fewest steps; the most forgiving one still does where both parts are a third off and the slope is gentler.
+# Before one is recommended, the monitor that judges trials has seen it come into step. The folder gets `design.png`,
+# a card to print.
+#
+#     dcdrw design --available parts.csv --mass 10 --length 0.9652 --spokes 12 --slope-deg 2 --out design
+
+# %%
+RIG = ['--mass', '10', '--length', '0.9652', '--spokes', '12', '--slope-deg', '2']
+assert dcdrw(['design', '--available', 'parts.csv', *RIG, '--out', 'design']) == 0
+
+# %% [markdown]
+# ## The one that you hold in your hands
+#
+# Measured, the spring has 46 N/m and the dashpot 92 N·s/m. Its limit cycle, how far the phase swings within a step,
+# and what a step leaves of an error:
+#
+#     dcdrw map --k 46 --b 92 --slope-deg 2
+
+# %%
+assert dcdrw(['map', '--k', '46', '--b', '92', *RIG]) == 0
+
+# %% [markdown]
+# ## How far it is from stalling
+#
+# Every damper takes energy; on too gentle a slope the pair stands. `gentlest` is the slope on which this coupler's
+# limit cycle ends.
+#
+#     dcdrw regimes --k 46 --b 92 --slope-deg 2
+
+# %%
+assert dcdrw(['regimes', '--k', '46', '--b', '92', *RIG]) == 0
+
+# %% [markdown]
+# ## A rig file for the laboratory
+#
+# What was measured goes into a copy of `config/rig.yaml`, which every command and every node reads: `dcdrw trial
+# --rig my_rig.yaml` runs the trial, `dcdrw report` puts a day of them on one page. [On the rig](../rig.md) goes on
+# from here.
