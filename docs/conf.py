@@ -24,7 +24,6 @@ html_show_sourcelink = False
 myst_heading_anchors = 4
 myst_fence_as_directive = ['mermaid']
 default_role = 'code'
-autosummary_ignore_module_all = False
 autodoc_member_order = 'bysource'
 suppress_warnings = ['ref.python']  # a type such as `type` is a field of several classes, too
 
@@ -33,10 +32,10 @@ def page_of_script(app, docname, source):
     """A tutorial is a script in cells, `# %%` before code and `# %% [markdown]` before text in comments."""
     if docname.startswith('tutorials/'):
         cells = re.split(r'^# %%(.*)\n', source[0], flags=re.MULTILINE)[1:]
-        source[0] = '\n\n'.join(
-            re.sub(r'^# ?', '', cell.strip(), flags=re.MULTILINE)
+        source[0] = ''.join(
+            re.sub(r'^# ?', '', cell, flags=re.MULTILINE)
             if 'markdown' in kind
-            else f'```python\n{cell.strip()}\n```'
+            else f'```python\n{cell.strip()}\n```\n\n'
             for kind, cell in zip(cells[::2], cells[1::2], strict=True)
         )
 

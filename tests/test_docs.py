@@ -5,6 +5,7 @@ import runpy
 import shlex
 import shutil
 from configparser import ConfigParser
+from itertools import pairwise
 
 import pytest
 
@@ -18,7 +19,7 @@ from tests import ROOT
 from tests.snippets import ELSEWHERE, PAGES, blocks, commands, inline, targets
 
 QUICK = {'legs', 'map', 'simulate', 'tags', 'urdf'}
-"""Commands that are run as they stand in the docs; of the other ones the arguments are read, and their own tests run them."""
+"""Commands that are run as they stand in the docs. Of the others the arguments are read; their own tests run them."""
 NODES = {node.name: {field.name for params in node.parameters for field in fields(params)} for node in EXECUTABLES}
 TOPICS = {topic.name.lstrip('/'): topic.type for node in EXECUTABLES for topic in (*node.subscribes, *node.publishes)}
 SERVICES = {
@@ -40,7 +41,7 @@ def ros2(words: list[str]) -> None:
             dcdrw(rest)
         case ['run', 'dcdrw', node, *rest]:
             assert node in {*NODES, 'suite'}
-            for before, assignment in zip(rest, rest[1:], strict=False):
+            for before, assignment in pairwise(rest):
                 if before == '-p':
                     assert assignment.split(':=')[0] in NODES[node]
         case ['launch', 'dcdrw', file, *rest]:
@@ -126,6 +127,11 @@ def test_links_lead_somewhere():
             headings = re.findall(r'^#+ (.*)', path.read_text(encoding='utf-8'), re.MULTILINE)
             slugs = {re.sub(r'[^\w -]', '', heading.lower()).replace(' ', '-') for heading in headings}
             assert anchor in slugs, f'{snippet}: {snippet.code}'
+
+
+def test_every_page_is_on_the_site():
+    listed = (ROOT / 'docs' / 'index.md').read_text(encoding='utf-8').splitlines()
+    assert {path.stem for path in (ROOT / 'docs').glob('*.md')} - {'index'} <= set(listed)
 
 
 def test_files_that_are_named_exist():

@@ -73,9 +73,8 @@ for phase in (0.1, 0.216, 0.7):
     for name, controller in (('passive', None), ('deadbeat', HoldLaw(gains, rig.front.alpha, rig.rear.alpha))):
         rows = closed_loop(phase, controller)
         outside = np.flatnonzero(np.abs(rows[:, 0]) > 6.0)[-1] / RATE
-        print(
-            f'{name:9} from {phase:.1%}: outside ±6 % until {outside:4.1f} s, at most {np.abs(rows[:, 1]).max():.1f} N'
-        )
+        most = np.abs(rows[:, 1]).max()
+        print(f'{name:9} from {phase:.1%}: outside ±6 % until {outside:4.1f} s, at most {most:.1f} N')
         assert controller is None or outside < 2.5
 
 # %% [markdown]
