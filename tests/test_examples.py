@@ -33,18 +33,9 @@ def test_the_controllers_force_follows_the_error_within_its_limit(bench):
     process = subprocess.Popen([sys.executable, WITH_ROS], env=environment)
     bench.processes.append(process)
 
-<<<<<<< HEAD
     def answered():
         answers = {max(-20.0, min(20.0, 1.5 * error.data)) for error in errors}
         return len(answers & {command.data for command in commands}) > 50
 
     bench.wait(answered, 'fifty answers')
     assert {abs(command.data) <= 20.0 for command in commands} == {True}
-=======
-    def answered() -> set[float]:
-        answers = {max(-20.0, min(20.0, 1.5 * error.data)) for error in errors}
-        return answers & {command.data for command in commands}
-
-    bench.wait(lambda: len(answered()) > 50, 'forces that answer errors')
-    assert max(abs(command.data) for command in commands) <= 20.0
->>>>>>> 7214254 (The documentation is a site with tutorials, glossary and FAQ, and every command in it is tested; make dist builds what pip installs)
