@@ -33,9 +33,9 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         yield Remark(f'{_begun_anew(trial, trial.resumed)}; what came before is left out.', True)
     refused = sum(estimator.refusals.values())
     if refused:
+        told = {**REFUSALS, **({'unreadable': trial.unreadable} if trial.unreadable else {})}
         reasons = '; '.join(
-            REFUSALS[why] if count == refused else f'{count} times {REFUSALS[why]}'
-            for why, count in estimator.refusals.items()
+            told[why] if count == refused else f'{count} times {told[why]}' for why, count in estimator.refusals.items()
         )
         of = estimator.accepted + estimator.duplicates + refused
         yield Remark(f'{refused} of {of} joint states were refused: {reasons}.', True)

@@ -128,6 +128,8 @@ class PosePairs:
             raise ValueError(f'the {wheel} wheel is at the origin, unturned: a default pose, sent while it is hidden')
         latest = self._latest.get(wheel)
         self._latest[wheel] = pose
+        if latest == pose:
+            return []  # the message has come twice
         if latest and latest[1:] == pose[1:]:
             raise ValueError(f'the pose of the {wheel} wheel repeats to the last bit, as where it is hidden')
         if self._y_up:

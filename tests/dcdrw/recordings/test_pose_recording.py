@@ -7,6 +7,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from dcdrw.cli import main
 from dcdrw.trials.results import read_trial
+from dcdrw.trials.summary import summarize
 from dcdrw_msgs_py.topics import FRONT_POSE, REAR_POSE
 from tests.bags import TYPES
 from tests.tracker.walking import ALPHA, PITCH, START_NS, walk
@@ -46,6 +47,16 @@ def test_a_recording_of_poses_alone_is_judged(tmp_path):
     assert math.degrees(ALPHA) == pytest.approx(15.0)
 
 
+def test_poses_that_come_twice_cost_nothing(tmp_path):
+    poses = streams(walk(4.0, 120.0))
+    once, twice = (
+        summarize(read_trial(pose_bag(tmp_path / name, [pose for pose in poses for _ in range(times)]))[0])
+        for times, name in ((1, 'once'), (2, 'twice'))
+    )
+    assert twice.samples.refused == {}
+    assert (twice.front_steps, twice.final_phase_percent) == (once.front_steps, once.final_phase_percent)
+
+
 def test_poses_of_no_use_are_counted_and_said(tmp_path, capsys):
     poses = streams(walk(4.0, 120.0))
     hidden = [
@@ -59,6 +70,7 @@ def test_poses_of_no_use_are_counted_and_said(tmp_path, capsys):
     ]
     trial, _ = read_trial(pose_bag(tmp_path / 'hidden', hidden))
     assert trial.estimator.refusals['unreadable'] > 100
+    assert 'the pose of the front wheel repeats to the last bit' in summarize(trial).sentence
     unstamped = [(wheel, pose._replace(stamp_ns=0)) for wheel, pose in poses]
     assert main(['analyze', str(pose_bag(tmp_path / 'unstamped', unstamped))]) == 2
     assert 'the stamps are zero' in capsys.readouterr().err
