@@ -51,6 +51,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--over', type=Path, metavar='RECORDING', help='draw an earlier trial of the rig beneath the live one'
     )
+    parser.add_argument(
+        '--allow-enable',
+        action='store_true',
+        help='let the page enable the synchronizer, and stop it: whoever may watch may then let it push',
+    )
     parser.add_argument('--open', action='store_true', help='open the page in a browser')
 
 
@@ -76,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
         commands: SimpleQueue[Command] = SimpleQueue()
         server = PageServer(listener, token, FRAMES_KEPT, lambda text: commands.put(read_command(text)), over)
         stack.callback(server.close)
-        executor = _listener(params, options.namespace, server, commands, bool(nodes), stack)
+        executor = _listener(params, options, server, commands, bool(nodes), stack)
         address = _address(listener, token)
         if stopped:  # before there was a page to end
             return interrupted_status(stopped)
@@ -95,7 +100,12 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _listener(
-    params: TrialParams, namespace: str, server: Any, commands: 'SimpleQueue[Command]', held: bool, stack: ExitStack
+    params: TrialParams,
+    options: argparse.Namespace,
+    server: Any,
+    commands: 'SimpleQueue[Command]',
+    held: bool,
+    stack: ExitStack,
 ) -> Any:
     """The executor of the node that listens."""
     import rclpy
@@ -106,7 +116,7 @@ def _listener(
 
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     stack.callback(rclpy.try_shutdown)
-    node = LiveNode(params, server.show, commands, held, namespace=namespace)
+    node = LiveNode(params, server.show, commands, held, options.allow_enable, namespace=options.namespace)
     stack.callback(node.destroy_node)
     executor = StreamExecutor()
     executor.add_node(node)

@@ -10,16 +10,25 @@ from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
+from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
 from dcdrw.page.live_state import FRAME_RATE, Command, LiveState
-from dcdrw.suite.executables import PHASE_ESTIMATOR, RECORDER, SIMULATOR, SYNC_MONITOR
+from dcdrw.suite.executables import PHASE_ESTIMATOR, RECORDER, SIMULATOR, SYNC_MONITOR, SYNCHRONIZER
 from dcdrw.suite.parameter_file import TrialParams
 from dcdrw_msgs_py.messages import JointSampleReader, PhaseSampleReader, diagnoses, footfall
-from dcdrw_msgs_py.node import listen, steady_clock
+from dcdrw_msgs_py.node import advertise, listen, steady_clock
 from dcdrw_msgs_py.quantity import build, fields
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
-from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, JOINT_STATES, PHASE_STATE
+from dcdrw_msgs_py.topics import (
+    DIAGNOSTICS,
+    ENABLE,
+    FOOTFALLS,
+    JOINT_STATES,
+    PERSON_FORCE,
+    PHASE_STATE,
+    SYNCHRONIZER_STATE,
+)
 from dcdrw_tracker.gait.phase import PhaseParams
 from dcdrw_tracker.gait.sync import SyncParams
 
@@ -135,10 +144,12 @@ class LiveNode(Node):
         show: Callable[[dict[str, Any]], None],
         commands: SimpleQueue[Command],
         held: bool = False,
+        may_enable: bool = False,
         **kwargs: Any,
     ) -> None:
         super().__init__('live', **kwargs)
-        self._state = LiveState(params)
+        self._state = LiveState(params, may_enable)
+        self._enable = advertise(self, ENABLE) if may_enable else None
         self._show, self._commands, self._held = show, commands, held
         self._prefix = self.get_namespace().strip('/') + '/' if self.get_namespace() != '/' else ''
         self._phase_reader = PhaseSampleReader()
@@ -148,6 +159,8 @@ class LiveNode(Node):
             (PHASE_STATE, self._on_phase),
             (FOOTFALLS[FRONT], lambda message: self._state.take_footfall(footfall(message, FRONT))),
             (FOOTFALLS[REAR], lambda message: self._state.take_footfall(footfall(message, REAR))),
+            (PERSON_FORCE, self._on_person_force),
+            (SYNCHRONIZER_STATE, lambda message: self._state.take_synchronizer_state(message.data)),
             (DIAGNOSTICS, self._on_diagnostics),
         ):
             listen(self, topic, _bearing(take))
@@ -159,6 +172,7 @@ class LiveNode(Node):
         self._reset = Service(self, Trigger, f'{SIMULATOR.name}/reset')
         self._pause = Service(self, SetBool, f'{SIMULATOR.name}/pause')
         self._record = Service(self, SetBool, f'{RECORDER.name}/record')
+        self._stop = Service(self, Trigger, f'{SYNCHRONIZER.name}/stop')
         self.create_timer(1.0 / FRAME_RATE, self._tick, clock=steady_clock())
         self.create_timer(ASK_SECONDS, self._ask, clock=steady_clock())
 
@@ -177,6 +191,9 @@ class LiveNode(Node):
     def _on_phase(self, message: Any) -> None:
         self._state.take_phase(self._phase_reader.read(message), time.monotonic())
 
+    def _on_person_force(self, message: Any) -> None:
+        self._state.take_person_force(message.wrench.force.x, time.monotonic())
+
     def _on_diagnostics(self, message: Any) -> None:
         for name, said in diagnoses(message).items():
             if name.startswith(self._prefix):
@@ -192,7 +209,7 @@ class LiveNode(Node):
         with suppress(Empty):
             while True:
                 self._do(self._commands.get_nowait())
-        for waiting in (self._simulator, *self._others, self._reset, self._pause, self._record):
+        for waiting in (self._simulator, *self._others, self._reset, self._pause, self._record, self._stop):
             waiting.poll()
         self._show(self._state.frame(time.monotonic()))
 
@@ -203,8 +220,19 @@ class LiveNode(Node):
             self._reset.call(Trigger.Request(), self._answered)
         elif command.do == 'pause':
             self._pause.call(SetBool.Request(data=command.value), self._let_go)
+        elif command.do in ('enable', 'stop'):
+            self._act(command)
         else:
             self._record.call(SetBool.Request(data=command.value), self._answered)
+
+    def _act(self, command: Command) -> None:
+        """Pass on a heartbeat of the page, or its stop: only where the command line allowed it."""
+        if self._enable is None:
+            self._state.notice('start dcdrw live with --allow-enable to enable and stop from here', ok=False)
+            return
+        self._enable.publish(Bool(data=bool(command.value)))
+        if command.do == 'stop':
+            self._stop.call(Trigger.Request(), self._answered)
 
     def _told(self, reason: str) -> None:
         if reason:

@@ -139,7 +139,11 @@ export function drawForce(points, now) {
 }
 
 // One bar is one stance, from a footfall to that wheel's next; the legs alternate in shade. Faint: a footfall is missing.
-export function drawGait(falls, now) {
+export function drawGait(falls, now, board) {
+  if (board && board.person) {
+    drawFeet(falls, now);
+    return;
+  }
   const chart = frameOf('gait-canvas', 0, 1, []);
   const { canvas, context, floor, top } = chart;
   const tall = (floor - top) / 2;
@@ -157,6 +161,38 @@ export function drawGait(falls, now) {
       const [, until, next] = own[i + 1] || [wheel, now, steps + 1];
       context.globalAlpha = next !== steps + 1 ? 0.12 : steps % 2 ? 0.9 : 0.38;
       context.fillRect(x(t), top + row * tall + 2, Math.max(x(until) - x(t), 1), tall - 5);
+    });
+    context.globalAlpha = 1;
+  });
+  context.restore();
+  canvas.dataset.falls = falls.length;
+}
+
+// Hildebrand's diagram of the four feet, by their numbers: a wheel's strikes are of the left and the right foot in turn.
+// Which of the robot's is left is decided by the first: the right rear foot (4) follows the left front one (1).
+function drawFeet(falls, now) {
+  const chart = frameOf('gait-canvas', 0, 1, []);
+  const { canvas, context, floor, top } = chart;
+  const tall = (floor - top) / 4;
+  context.font = context.font.replace('12px', '10px');
+  ['1 L', '2 R', '3 L', '4 R'].forEach((foot, row) => {
+    context.fillStyle = colour(row < 2 ? 'front' : 'rear');
+    context.textAlign = 'right';
+    context.textBaseline = 'middle';
+    context.fillText(foot, LEFT - 4, top + (row + 0.5) * tall);
+  });
+  const x = timeAxis(chart, now);
+  const second = falls.findIndex(([wheel], i) => wheel === 'rear' && falls.slice(0, i).some(([other]) => other === 'front'));
+  const before = falls.slice(0, Math.max(second, 0)).findLast(([wheel]) => wheel === 'front');
+  const side = before ? Math.abs(falls[second][2] + before[2] + 1) % 2 : 0;
+  ['front', 'rear'].forEach((wheel, half) => {
+    const own = falls.filter(([name]) => name === wheel);
+    context.fillStyle = colour(wheel);
+    own.forEach(([, t, steps], i) => {
+      const [, until, next] = own[i + 1] || [wheel, now, steps + 1];
+      const row = 2 * half + Math.abs(steps + half * side) % 2;
+      context.globalAlpha = next !== steps + 1 ? 0.12 : 0.9;
+      context.fillRect(x(t), top + row * tall + 2, Math.max(x(until) - x(t) - 1, 1), tall - 4);
     });
     context.globalAlpha = 1;
   });

@@ -6,9 +6,11 @@ const element = (id) => document.getElementById(id);
 const HOLD_MS = 1500;  // after a touch, a slider shows what was asked for, until the node has answered
 const SEND_MS = 80;
 const NOTICE_MS = 10000;
+const BEAT_MS = 60;  // the heartbeat lasts as long as this page is in sight and connected
+const CONFIRM_MS = 4000;
 
 let send = () => false;
-let board = null, fading = null;
+let board = null, fading = null, beating = null, asked = null;
 const sliders = new Map();
 
 export function setUpControls(sender) {
@@ -19,7 +21,43 @@ export function setUpControls(sender) {
   element('reset').addEventListener('click', () => send({ do: 'reset' }));
   element('pause').addEventListener('click', () => send({ do: 'pause', value: !board.paused }));
   element('record').addEventListener('click', () => send({ do: 'record', value: !board.recording }));
+  element('enable').addEventListener('click', () => (beating ? endBeat() : asked ? beginBeat() : ask()));
+  element('stop').addEventListener('click', () => {
+    endBeat();
+    send({ do: 'stop' });
+  });
+  document.addEventListener('visibilitychange', () => document.hidden && beating && endBeat());
   showControls(null);
+}
+
+// The first touch asks, the second enables; a touch later ends it.
+function ask() {
+  asked = setTimeout(() => { asked = null; showActing(); }, CONFIRM_MS);
+  showActing();
+}
+
+function beginBeat() {
+  clearTimeout(asked);
+  asked = null;
+  beating = setInterval(() => send({ do: 'enable', value: true }), BEAT_MS);
+  showActing();
+}
+
+function endBeat() {
+  clearInterval(beating);
+  beating = null;
+  send({ do: 'enable', value: false });
+  showActing();
+}
+
+function showActing() {
+  const acts = board && board.synchronizer;
+  const person = board && board.person;
+  element('acting').hidden = !acts;
+  element('acts').textContent = acts ? acts.replace('_', ' ') : '–';
+  element('enable').hidden = element('stop').hidden = !(board && board.may_enable);
+  press('enable', Boolean(beating), 'Release', asked ? 'Really let it push?' : 'Enable');
+  element('person').textContent = person ? `· on the person at most ${person.peak} N, ${person.rms} N rms` : '';
 }
 
 export function showControls(news) {
@@ -33,6 +71,8 @@ export function showControls(news) {
   element('record').disabled = !recorder;
   press('pause', simulated && board.paused, 'Go on', 'Pause');
   press('record', recorder && board.recording, '■ Stop recording', '● Record');
+  if (beating && (!board || board.unknown || !board.synchronizer)) endBeat();  // nobody is there to hear it
+  showActing();
   const hints = [];
   if (board && !board.unknown && !simulated) hints.push('No simulator runs here: sliders, reset and pause act on the simulated rig alone.');
   if (board && !board.unknown && !recorder) hints.push('No recorder runs here: start the node recorder to record.');

@@ -102,7 +102,7 @@ function draw() {
   watch();
   drawRig(frame && frame.rig, board);
   drawPhi(kept.phis, now(), board, sameWheels() && frame.start !== null ? { ...over, start: frame.start } : null);
-  drawGait(kept.falls, now());
+  drawGait(kept.falls, now(), board);
   drawForce(kept.forces, now());
   drawErrors(board);
   if (board) showNodes(board.nodes);

@@ -8,7 +8,7 @@ import math
 from collections import deque
 from typing import Any, NamedTuple
 
-from dcdrw.suite.executables import EXECUTABLES, PHASE_ESTIMATOR, RECORDER, SIMULATOR, SYNC_MONITOR
+from dcdrw.suite.executables import EXECUTABLES, PHASE_ESTIMATOR, RECORDER, SIMULATOR, SYNC_MONITOR, SYNCHRONIZER
 from dcdrw.suite.parameter_file import TrialParams
 from dcdrw_msgs_py.diagnosis import (
     LOST_SAMPLES,
@@ -68,7 +68,7 @@ class Command(NamedTuple):
     """What somebody asks for on the page."""
 
     do: str
-    """`set`, `reset`, `pause` or `record`."""
+    """`set`, `reset`, `pause`, `record`, `enable` or `stop`."""
     name: str = ''
     """Name of the parameter to set."""
     value: float = 0.0
@@ -90,9 +90,9 @@ def read_command(text: str) -> Command:
         if not isinstance(value, (int, float)):
             raise ValueError(f'{name} must be a number, got {value!r}')
         return Command('set', name, CONTROLS[name].coerce(value))
-    if do == 'reset':
-        return Command('reset')
-    if do in ('pause', 'record') and isinstance(value, bool):
+    if do in ('reset', 'stop'):
+        return Command(do)
+    if do in ('pause', 'record', 'enable') and isinstance(value, bool):
         return Command(do, value=value)
     raise ValueError(f'not a command: {text[:80]}')
 
@@ -102,14 +102,33 @@ class _Health(NamedTuple):
     at: float
 
 
+class _PersonForce:
+    """The force on a person who walks in front, since the run began [N]."""
+
+    def __init__(self) -> None:
+        self._at, self._count, self._peak, self._squares = -math.inf, 0, 0.0, 0.0
+
+    def take(self, force: float, now: float) -> None:
+        self._at, self._count = now, self._count + 1
+        self._peak, self._squares = max(self._peak, abs(force)), self._squares + force * force
+
+    def told(self, now: float) -> dict[str, Any] | None:
+        """Its peak and rms; None where none is told of late."""
+        if now - self._at > SILENT_SECONDS:
+            return None
+        return {'peak': _rounded(self._peak, 1), 'rms': _rounded(math.sqrt(self._squares / self._count), 1)}
+
+
 class LiveState:
     """Takes what the topics bring; `frame` tells what is new.
 
     Callers give the time `now` [s] by a clock that never jumps: ages are taken from it, all else from the stamps.
     """
 
-    def __init__(self, params: TrialParams) -> None:
-        self._params = params
+    def __init__(self, params: TrialParams, may_enable: bool = False) -> None:
+        self._params, self._may_enable = params, may_enable
+        self._synchronizer = ''
+        self._person = _PersonForce()
         self._monitor = SyncMonitor(params.sync)
         self._joints: deque[JointSample] = deque(maxlen=_MATCHED)
         self._phases: deque[PhaseSample] = deque(maxlen=_MATCHED)
@@ -184,6 +203,16 @@ class LiveState:
             self._feet[fall.wheel] = fall.x
             self._falls.append([fall.wheel, self._seconds(fall.stamp_ns), round(steps)])
 
+    def take_synchronizer_state(self, state: str) -> None:
+        """Take what the synchronizer does."""
+        self._synchronizer = state
+        self._renew()
+
+    def take_person_force(self, force: float, now: float) -> None:
+        """Take the force on the person [N]; what is no number is passed over."""
+        if math.isfinite(force):
+            self._person.take(force, now)
+
     def take_health(self, name: str, said: Diagnosis, now: float) -> None:
         """Take what a node says of itself on `/diagnostics`."""
         said = said._replace(message=said.message[:LONGEST_MESSAGE])
@@ -246,6 +275,7 @@ class LiveState:
         """The source has started anew, or its clock was set: what the charts had is of another run."""
         self._run += 1
         self._start = None
+        self._person = _PersonForce()
         for kept in (self._phases, self._phis, self._forces, self._falls, self._feet):
             kept.clear()
         self._renew()
@@ -345,6 +375,9 @@ class LiveState:
             'controls': [_control(field, params.rig) for field in CONTROLS.values()],
             'simulated': self._controls is not None and simulator is not None,
             'paused': simulator is not None and simulator.state(SourceState) is SourceState.PAUSED,
+            'person': self._person.told(now),
+            'synchronizer': self._synchronizer if self._says(SYNCHRONIZER.name, now) else None,
+            'may_enable': self._may_enable,
             'recorder': recorder is not None,
             'recording': recorder is not None and recorder.state(RecorderState) is RecorderState.RECORDING,
         }

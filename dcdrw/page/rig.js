@@ -21,7 +21,7 @@ export function drawRig(rig, board) {
   const middle = (front.x + rear.x) / 2;
   const reach = Math.abs(front.x - rear.x) + front.length + rear.length;
   const tallest = 2 * Math.max(front.length, rear.length);
-  const scale = Math.min((height - 34) / (tallest * 1.04), (width - 24) / (reach * 1.06));
+  const scale = Math.max(Math.min((height - 34) / (tallest * 1.04), (width - 24) / (reach * 1.06)), 1);  // while a layout settles there may be no room
   const ground = height - 20 - Math.min(40, (width / 2) * Math.abs(Math.tan(board.slope)) * 0.5);
 
   context.save();

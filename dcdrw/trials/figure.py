@@ -19,6 +19,8 @@ SCREEN = 10.0
 LETTERS = 15
 """Letters of POINTS that an inch of a title's line holds."""
 _FORCE = '#555555'
+FEET = {1: '1 left', 2: '2 right', 3: '3 left', 4: '4 right'}
+"""Of the person in front, and of the robot behind."""
 
 
 def draw_trial(trial: Analysis, title: str, path: Path) -> None:
@@ -53,7 +55,10 @@ def trial_figure(trial: Analysis, title: str, width: float = SCREEN) -> Any:
     angles, phase, gait, *force = figure.subplots(panels, 1, sharex=True, height_ratios=(3, 3, 1.3, 2)[:panels])
     _draw_angles(angles, course)
     _draw_phase(phase, course)
-    _draw_gait(gait, course)
+    if course.person:
+        _draw_feet(gait, course)
+    else:
+        _draw_gait(gait, course)
     for axes in force:
         _draw_force(axes, course)
     last = force[0] if force else gait
@@ -91,6 +96,11 @@ class _Course(NamedTuple):
     def step(self) -> float:
         """φ of a whole step [°]."""
         return math.degrees(self.trial.pitch)
+
+    @property
+    def person(self) -> bool:
+        """Whether a person walks in the place of the front wheel."""
+        return self.trial.params.simulator.person.walks
 
     def line(self, values: Floats, jump: float = math.inf) -> tuple[Floats, Floats]:
         """Time and values of a curve, cut where samples are missing, and where it jumps by more than this."""
@@ -186,7 +196,46 @@ def _draw_gait(axes: Any, course: _Course) -> None:
     axes.set_ylabel('stances')
 
 
+def _draw_feet(axes: Any, course: _Course) -> None:
+    """Hildebrand's diagram of the four feet, numbered in their rows: a bar from each footfall to the other foot's.
+
+    A wheel's strikes are of the left and the right foot in turn. The front one begins with the left; of the rear one,
+    that is left which leads it by a quarter stride as nearly as can be.
+    """
+    rows: dict[int, list[tuple[float, float]]] = {foot: [] for foot in FEET}
+    falls = {wheel: course.falls(wheel) for wheel in (FRONT, REAR)}
+    side = _rear_side(falls[FRONT], falls[REAR])
+    for wheel, first, offset in ((FRONT, 1, 0), (REAR, 3, side)):
+        for (begin, steps), (until, after) in pairwise(falls[wheel]):
+            if after == steps + 1 and any(start <= begin and until <= stop for start, stop in course.pieces):
+                rows[first + (steps + offset) % 2].append((begin, until - begin))
+    for foot, bars in rows.items():
+        wheel = FRONT if foot <= 2 else REAR
+        axes.broken_barh(bars, (-foot - 0.35, 0.7), color=WHEELS[wheel], alpha=0.85, linewidth=0)
+    axes.set_yticks([-foot for foot in FEET], list(FEET.values()))
+    axes.set_ylim(-4.6, -0.4)
+    axes.set_ylabel('feet')
+
+
+def _rear_side(front: list[tuple[float, int]], rear: list[tuple[float, int]]) -> int:
+    """0 where the rear wheel's even steps are of the left foot, 1 where its odd ones are: in the order 1-4-2-3."""
+    for second, steps in rear:
+        before = [number for begin, number in front if begin <= second]
+        if before:
+            return (steps + before[-1] + 1) % 2  # the right rear foot follows the left front one
+    return 0
+
+
 def _draw_force(axes: Any, course: _Course) -> None:
+    force = course.motion.coupler_force
     axes.axhline(0.0, color='0.85', zorder=0, linewidth=0.8)
-    axes.set_ylabel('coupler force [N]')
-    axes.plot(*course.line(course.motion.coupler_force), color=_FORCE, linewidth=1.0)
+    if not course.person:
+        axes.set_ylabel('coupler force [N]')
+        axes.plot(*course.line(force), color=_FORCE, linewidth=1.0)
+        return
+    peak, rms = np.nanmax(np.abs(force)), math.sqrt(np.nanmean(force**2))
+    axes.set_ylabel('on the person [N]')  # tension pulls back
+    axes.plot(
+        *course.line(-force), color=_FORCE, linewidth=1.0, label=f'at most {peak:.1f} N, {rms:.1f} N rms, + forward'
+    )
+    _legend(axes)

@@ -14,9 +14,11 @@ from rcl_interfaces.srv import GetParameters
 from rclpy.parameter import parameter_value_to_python
 
 from dcdrw.page.live_state import LATE_DATA
+from dcdrw.suite.hub_gains import hub_gains
 from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.messages import stamp_ns
-from dcdrw_msgs_py.topics import JOINT_STATES, PHASE_STATE
+from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.topics import JOINT_STATES, PHASE_STATE, SYNCHRONIZER_STATE
 from dcdrw_msgs_py.topics import SYNCHRONIZED as VERDICT
 from tests import ROOT
 from tests.bench import PATIENCE, Bench
@@ -196,6 +198,27 @@ def test_sliders_and_buttons_act_through_the_nodes(bench, live, chromium, tmp_pa
     click(tab, 'record')
     tab.wait("document.getElementById('record').getAttribute('aria-pressed') === 'false'")
     assert (tmp_path / 'recording' / 'metadata.yaml').exists()
+    assert tab.complaints == []
+
+
+def test_the_synchronizer_is_enabled_and_stopped_from_the_page_where_that_is_allowed(bench, live, chromium):
+    states = bench.hear(SYNCHRONIZER_STATE)
+    gains = {f'hub.{name}': value for name, value in hub_gains(RigParams(k=16.0, b=10.0))._asdict().items()}
+    gains['hub.free_speeds'] = list(gains['hub.free_speeds'])
+    bench.start('synchronizer', law='rear', **gains)
+    start_nodes(bench, k=16.0, b=10.0, person__walks=True)
+    tab = chromium.tab(live.start('--allow-enable'))
+    tab.wait("!document.getElementById('acting').hidden && document.getElementById('acts').textContent === 'disabled'")
+    tab.wait("document.getElementById('person').textContent.includes('on the person at most')")
+    click(tab, 'enable')
+    assert text(tab, 'enable') == 'Really let it push?'
+    bench.spin(0.5)
+    assert states[-1].data == 'disabled', 'one touch only asks'
+    click(tab, 'enable')
+    bench.wait(lambda: 'active' in [state.data for state in states], 'the synchronizer to push')
+    click(tab, 'stop')
+    bench.wait(lambda: states[-1].data in ('disabled', 'fault'), 'the stop')
+    assert text(tab, 'enable') == 'Enable'
     assert tab.complaints == []
 
 

@@ -309,6 +309,8 @@ def test_command_is_read_or_refused_with_the_reason():
     assert read_command('{"do": "set", "name": "k", "value": 12}') == Command('set', 'k', 12.0)
     assert read_command('{"do": "pause", "value": true}') == Command('pause', value=True)
     assert read_command('{"do": "reset"}') == Command('reset')
+    assert read_command('{"do": "stop"}') == Command('stop')
+    assert read_command('{"do": "enable", "value": true}') == Command('enable', value=True)
     for text, reason in (
         ('{"do": "set", "name": "k", "value": -1}', 'k must be ≥ 0'),
         ('{"do": "set", "name": "slope", "value": 2}', 'slope must be'),
@@ -316,12 +318,26 @@ def test_command_is_read_or_refused_with_the_reason():
         ('{"do": "set", "name": "rate", "value": 1}', 'not a command'),
         ('{"do": "set", "name": [], "value": 1}', 'not a command'),
         ('{"do": "pause", "value": 1}', 'not a command'),
+        ('{"do": "enable"}', 'not a command'),
         ('[]', 'must be an object'),
         ('{', 'Expecting'),
         ('', 'Expecting'),
     ):
         with pytest.raises(ValueError, match=reason):
             read_command(text)
+
+
+def test_person_and_synchronizer_are_told_while_they_speak():
+    state = LiveState(TrialParams(), may_enable=True)
+    for force in (3.0, -4.0, math.nan):
+        state.take_person_force(force, 1.0)
+    state.take_synchronizer_state('armed')
+    state.take_health('synchronizer', Diagnosis(Level.OK, 'armed', {}), 1.0)
+    board = state.frame(1.0)['board']
+    assert board['person'] == {'peak': 4.0, 'rms': 3.5}
+    assert (board['synchronizer'], board['may_enable']) == ('armed', True)
+    board = state.frame(20.0)['board']
+    assert (board['person'], board['synchronizer']) == (None, None)
 
 
 numbers = st.floats(allow_nan=True, allow_infinity=True)

@@ -1,5 +1,7 @@
 """The picture of a trial shows what was measured, and nothing where nothing was."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from matplotlib.text import Text
@@ -8,6 +10,8 @@ from dcdrw.suite.parameter_file import TrialParams
 from dcdrw.trials.analysis import analyze
 from dcdrw.trials.figure import SCREEN, draw_trial, trial_figure
 from dcdrw_sim.figures.style import COLUMN, POINTS, for_print
+from dcdrw_sim.rig.person import PersonParams
+from dcdrw_sim.rig.simulator import SimulatorParams
 from tests.tracker.walking import walk
 from tests.trials import batch
 
@@ -51,6 +55,26 @@ def test_gaps_are_named_and_where_there_are_none_so_is_nothing():
         assert ('no samples' in names) is named
 
 
+PERSON = TrialParams()._replace(simulator=SimulatorParams(person=PersonParams(walks=True)))
+
+
+def test_a_persons_trial_shows_four_feet_in_the_order_1_4_2_3_and_the_force_on_the_person():
+    drawn = trial_figure(analyze([batch(WALK, -3.0)], PERSON), '')
+    gait, force = drawn.axes[2], drawn.axes[3]
+    assert [label.get_text() for label in gait.get_yticklabels()] == ['1 left', '2 right', '3 left', '4 right']
+    begins = sorted(
+        (path.vertices[:, 0].min(), foot)
+        for foot, bars in enumerate(gait.collections, start=1)
+        for path in bars.get_paths()
+    )
+    feet = [foot for _, foot in begins]
+    assert len(feet) > 30
+    assert all((one, other) in ((1, 4), (4, 2), (2, 3), (3, 1)) for one, other in pairwise(feet))
+    assert force.get_ylabel() == 'on the person [N]'
+    assert np.nanmax(force.lines[1].get_ydata()) == 3.0, 'compression pushes the person forward'
+    assert force.get_legend().get_texts()[0].get_text().startswith('at most 3.0 N, 3.0 N rms')
+
+
 def test_a_source_without_force_has_no_empty_panel():
     assert [axes.get_ylabel() for axes in figure(WALK).axes][-1] == 'coupler force [N]'
     panels = figure(WALK, force=np.nan).axes
@@ -61,10 +85,11 @@ def test_a_source_without_force_has_no_empty_panel():
 @pytest.mark.parametrize('samples', [WALK[:600], WALK, without(0.5, 11.0)], ids=['3 s', '12 s', 'mostly gap'])
 @pytest.mark.parametrize('force', [1.0, np.nan], ids=['force', 'no force'])
 @pytest.mark.parametrize('width', [SCREEN, COLUMN], ids=['screen', 'column'])
-def test_no_text_covers_another(samples, force, width):
+@pytest.mark.parametrize('params', [TrialParams(), PERSON], ids=['wheels', 'person'])
+def test_no_text_covers_another(samples, force, width, params):
     long = 'From 21.6 % to within ±6 % of 50 % of a step (25 % of a stride) in 9 steps. ' * 4
     with for_print():
-        drawn = trial_figure(analyze([batch(samples, force)], TrialParams()), long, width)
+        drawn = trial_figure(analyze([batch(samples, force)], params), long, width)
     drawn.draw_without_rendering()
     texts = [
         drawn._suptitle,
