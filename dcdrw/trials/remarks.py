@@ -33,7 +33,8 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         yield Remark(f'{_begun_anew(trial, trial.resumed)}; what came before is left out.', True)
     refused = sum(estimator.refusals.values())
     if refused:
-        told = {**REFUSALS, **({'unreadable': trial.unreadable} if trial.unreadable else {})}
+        told = dict(REFUSALS)
+        told['unreadable'] = trial.unreadable or told['unreadable']
         reasons = '; '.join(
             told[why] if count == refused else f'{count} times {told[why]}' for why, count in estimator.refusals.items()
         )
