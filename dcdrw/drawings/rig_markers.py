@@ -112,16 +112,17 @@ class RigView:
             return self._stance + steps * self.params.front.step_length
         return steps * self.params.rear.step_length
 
-    def shapes(self, says: Diagnosis | None = None) -> tuple[Shape, ...]:
+    def shapes(self, says: Diagnosis | None = None, synchronizer: str = '') -> tuple[Shape, ...]:
         """The drawing; nothing before the first sample.
 
         Args:
             says: what is known of the pair, the monitor's diagnosis say, to be written above the rig.
+            synchronizer: what the synchronizer does; empty where there is none.
 
         """
-        return tuple(self._draw(says)) if self._phase else ()
+        return tuple(self._draw(says, synchronizer)) if self._phase else ()
 
-    def _draw(self, says: Diagnosis | None) -> Iterator[Shape]:
+    def _draw(self, says: Diagnosis | None, synchronizer: str) -> Iterator[Shape]:
         assert self._phase
         params, phase, status = self.params, self._phase.phase, self._estimator.status()
         theta = {FRONT: phase.front.angle, REAR: phase.rear.angle}
@@ -189,6 +190,8 @@ class RigView:
         lines = [phase_text(phase.phi.angle / phi_pitch(params.front, params.rear)), f'n = {phase.step_difference}']
         if math.isfinite(self._force):
             lines[1] += f', coupler {self._force:+.1f} N'
+        if synchronizer:
+            lines.append(f'synchronizer {synchronizer}')
         if says:
             lines.append(says.message)
         yield Shape(

@@ -10,7 +10,7 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from dcdrw.drawings.rig_markers import MarkerParams, RigView, Shape, about_y
-from dcdrw_msgs_py.diagnosis import Diagnosis, Level
+from dcdrw_msgs_py.diagnosis import STATE, Diagnosis, Level
 from dcdrw_msgs_py.messages import JointSampleReader, diagnoses
 from dcdrw_msgs_py.node import Age, Parameters, advertise, follow_runs, listen, publish_diagnosis, run, steady_clock
 from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, RIG_MARKERS
@@ -19,7 +19,7 @@ STALE_AFTER = 1.0
 """Age of the last sample from which there are no data [s]; the drawing is then repeated so often, and says so."""
 LIFETIME = 4
 """A drawing that is not renewed for so long goes: the node has ended [s]."""
-MONITOR = 'sync_monitor'
+MONITOR, SYNCHRONIZER = 'sync_monitor', 'synchronizer'
 
 
 class RigMarkersNode(Node):
@@ -31,14 +31,17 @@ class RigMarkersNode(Node):
         params = self._settings.value
         self._view = RigView(params)
         self._reader = JointSampleReader(params.front_joint, params.rear_joint, params.coupler_joint)
-        self._monitor = f'{self.get_namespace().strip("/")}/{MONITOR}'.lstrip('/')
+        self._monitor, self._synchronizer = (
+            f'{self.get_namespace().strip("/")}/{name}'.lstrip('/') for name in (MONITOR, SYNCHRONIZER)
+        )
         self._markers = advertise(self, RIG_MARKERS)
         self._message: Any = None
         self._header = Header(frame_id=params.frame)
         self._says: Diagnosis | None = None
+        self._acts = ''
         self._drawn_run = 0
         self._drawings = 0
-        self._sample_age, self._drawn_age, self._says_age = Age(), Age(), Age()
+        self._sample_age, self._drawn_age, self._says_age, self._acts_age = Age(), Age(), Age(), Age()
         publish_diagnosis(self, self._diagnose)
         self.create_timer(1.0 / params.redraw_rate, self._tick, clock=steady_clock())
         listen(self, DIAGNOSTICS, self._on_diagnostics)
@@ -49,10 +52,13 @@ class RigMarkersNode(Node):
         self._message = message
 
     def _on_diagnostics(self, message: Any) -> None:
-        said = diagnoses(message).get(self._monitor)
-        if said:
-            self._says = said
+        said = diagnoses(message)
+        if monitor := said.get(self._monitor):
+            self._says = monitor
             self._says_age.renew()
+        if synchronizer := said.get(self._synchronizer):
+            self._acts = str(synchronizer.values.get(STATE, ''))
+            self._acts_age.renew()
 
     def _configure(self, params: MarkerParams) -> None:
         self._view.params = params
@@ -77,7 +83,7 @@ class RigMarkersNode(Node):
         return taken
 
     def _draw(self) -> None:
-        shapes = self._view.shapes(self._caption())
+        shapes = self._view.shapes(self._caption(), self._acts if self._acts_age.seconds <= LIFETIME else '')
         if not shapes:
             return
         markers = [to_marker(shape, self._header) for shape in shapes]

@@ -164,6 +164,8 @@ def test_what_is_written_is_the_phase_the_coupler_and_what_the_monitor_says():
         'slipped a step: n = 2',
     ]
     view.update(JointSample(2, Turn(0.0, 1.0), Turn(-math.pi / 24, 1.0)))
+    *_, acting = view.shapes(None, 'active')
+    assert 'synchronizer active' in acting.text.splitlines()
     *_, silent = view.shapes()
     assert silent.text.splitlines()[1:] == ['n = 0']
     assert silent.colour != label.colour
