@@ -57,11 +57,11 @@ def bare_kernel() -> Callable[[int], None]:
     for part in np.array_split(np.arange(COUNT), CORES):
         work, parameters = ensemble._aligned(ensemble.SIZE), ensemble._parameters(take(pairs, part))
         motion = ensemble._blank(len(part), capacity)
-        jobs.append((work, parameters, starts[part], SWEEP.seconds, ensemble.ENSEMBLE_TOLERANCE, None, *motion))
+        jobs.append((work, parameters, starts[part], SWEEP.seconds, ensemble.ENSEMBLE_TOLERANCE, None, None, None, *motion))
 
     def program(cores: int) -> None:
         for job in jobs:
-            job[7][:] = 0  # the counts
+            job[9][:] = 0  # the counts
         on_threads(cores, lambda job: ensemble._run(*job), jobs)
 
     return program

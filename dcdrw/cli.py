@@ -19,6 +19,7 @@ COMMANDS = {
     'tags': Command('tag_sheet', 'print the tags of the wheels, true to scale'),
     'track': Command('track', 'track the wheels in a video, and judge the trial'),
     'calibrate': Command('calibrate', 'learn downhill, lengths and zeros from a video of one roll'),
+    'identify': Command('identify', 'what recorded trials tell of the rig, with errors'),
     'design': Command('design', 'choose spring and dashpot for a rig'),
     'sweep': Command('sweep', 'which couplers synchronize, and how fast'),
     'figures': Command('figures', "the paper's simulated figures, and what explains them"),
@@ -41,6 +42,7 @@ examples:
   dcdrw mend trials/killed --out mended   what can be read of a damaged recording, for other tools
   dcdrw legs walk.csv --rate 204.8        people's heel strikes and phase, from sensors on their legs
   dcdrw report trials/* --out today.html  a day of trials on one page
+  dcdrw identify trials/* --rig my_rig.yaml --out identified   the rig's parameters, with errors
   dcdrw design --slope-deg 2.5            which spring and dashpot to buy
   dcdrw map --rig my_rig.yaml             how fast the pair falls into step: multipliers of the return map
   dcdrw control --rig my_rig.yaml --out gains.yaml   gains of the active synchronizer

@@ -4,13 +4,16 @@ import argparse
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar, get_args
+
+import numpy as np
 
 from dcdrw.console import count, degrees, number
 from dcdrw.suite.executables import EXECUTABLES
-from dcdrw_msgs_py.quantity import build, fields, flatten, suggestion
+from dcdrw_msgs_py.quantity import Field, Quantity, build, fields, flatten, suggestion
 from dcdrw_msgs_py.rig import RigParams, WheelPitch, WheelShape
 from dcdrw_msgs_py.yaml_file import read_yaml, yaml_text
+from dcdrw_sim.identification.unknowns import Uncertainty, names_of_unknowns
 from dcdrw_sim.model.presets import PRESETS
 from dcdrw_sim.rig.simulator import SimulatorParams
 from dcdrw_tracker.gait.phase import PhaseParams
@@ -19,6 +22,9 @@ from dcdrw_tracker.gait.sync import SyncParams
 _EVERY_NODE = '/**'
 _PARAMETERS = 'ros__parameters'
 _OF_ROS = ('use_sim_time',)
+_UNCERTAINTY = 'uncertainty'
+"""The section that tells how well a rig is known: to ROS the parameters of a node that nobody starts."""
+_ERRORS, _CORRELATIONS = 'standard_errors', 'correlations'
 _NODES_OF = {
     kind: [node.name for node in EXECUTABLES if kind in node.parameters]
     for each in EXECUTABLES
@@ -60,12 +66,8 @@ def read_parameter_file(path: Path, base: Sets, namespace: str = '') -> Sets:
         OSError: the file cannot be read.
 
     """
-    content = read_yaml(path)
-    if not isinstance(content, dict) or not all(_is_section(section) for section in content.values()):
-        raise ValueError(
-            f'{path} is not a parameter file: it must have the form of config/rig.yaml, '
-            f'"{_EVERY_NODE}:", "{_PARAMETERS}:", then the parameters'
-        )
+    content = _read(path)
+    _uncertainty(content, path)
     sections = _sections(content, path, namespace)
     kinds = {name: type(values) for name, values in zip(base._fields, base, strict=True)}  # type: ignore[attr-defined]
     all_names = {field.name for kind in _NODES_OF for field in fields(kind)}.union(_OF_ROS)
@@ -80,11 +82,70 @@ def read_parameter_file(path: Path, base: Sets, namespace: str = '') -> Sets:
     return type(base)(**sets)
 
 
+def read_uncertainty(path: Path) -> Uncertainty | None:
+    """How well a parameter file says that its rig is known; None where it says nothing.
+
+    Raises:
+        ValueError, OSError: as `read_parameter_file`.
+
+    """
+    return _uncertainty(_read(path), path)
+
+
+def _read(path: Path) -> dict[str, Any]:
+    content = read_yaml(path)
+    if not isinstance(content, dict) or not all(_is_section(section) for section in content.values()):
+        raise ValueError(
+            f'{path} is not a parameter file: it must have the form of config/rig.yaml, '
+            f'"{_EVERY_NODE}:", "{_PARAMETERS}:", then the parameters'
+        )
+    return content
+
+
+def _uncertainty(content: Mapping[str, Any], path: Path) -> Uncertainty | None:
+    """The section on uncertainty; correlations of each parameter are with those before it."""
+    if _UNCERTAINTY not in content:
+        return None
+    told: dict[str, dict[str, Any]] = {_ERRORS: {}, _CORRELATIONS: {}}
+    for key, value in _flatten(content[_UNCERTAINTY][_PARAMETERS] or {}):
+        kind, _, name = key.partition('.')
+        if kind not in told:
+            raise ValueError(f'{path}: {_UNCERTAINTY} has {key}{suggestion(kind, told)}')
+        told[kind][name] = value
+    where = f'{_UNCERTAINTY} in {path}'
+    error = Annotated[float, Quantity('standard error', low=0.0)]
+    errors = {name: _coerced(error, name, value, where) for name, value in told[_ERRORS].items()}
+    for name in errors:
+        if name not in names_of_unknowns():
+            raise ValueError(f'{where}: {name} is nothing that can be uncertain{suggestion(name, names_of_unknowns())}')
+    names, correlations = list(errors), np.eye(len(errors))
+    part = Annotated[tuple[float, ...], Quantity('correlations', low=-1.0, high=1.0)]
+    for name, values in told[_CORRELATIONS].items():
+        row = _coerced(part, name, values, where)
+        place = names.index(name) if name in names else -1
+        if len(row) != place:
+            raise ValueError(f'{where}: {name} must have a standard error, and correlations with all before it')
+        correlations[place, :place] = correlations[:place, place] = row
+    if len(names) and np.linalg.eigvalsh(correlations)[0] < -1e-6:
+        raise ValueError(f'{where}: no errors can be correlated as these')
+    return Uncertainty(errors, correlations)
+
+
+def _coerced(hint: Any, name: str, value: Any, where: str) -> Any:
+    kind, quantity = get_args(hint)
+    try:
+        return Field(name, kind, None, quantity).coerce(value)
+    except ValueError as error:
+        raise ValueError(f'{error} ({where})') from None
+
+
 def _sections(content: Mapping[str, Any], path: Path, namespace: str) -> dict[str, dict[str, Any]]:
     """Parameters by node, whatever the namespace before its name, as long as it is one."""
     known = (_EVERY_NODE, *_NODES)
     places: list[tuple[str, str, str]] = []
     for section in map(str, content):
+        if section == _UNCERTAINTY:
+            continue
         space, _, node = ('', '', _EVERY_NODE) if section == _EVERY_NODE else section.rpartition('/')
         if node not in known:
             raise ValueError(f'{path} has parameters for {section}, which no trial has{suggestion(node, known)}')
@@ -181,7 +242,13 @@ def write_parameter_file(params: Iterable[tuple[Any, ...]], path: Path) -> None:
     path.write_text(yaml_text(content), encoding='utf-8')
 
 
-def write_changed(source: Path | None, changes: Mapping[str, Any], path: Path, remark: str) -> None:
+def write_changed(
+    source: Path | None,
+    changes: Mapping[str, Any],
+    path: Path,
+    remark: str,
+    uncertainty: Uncertainty | None = None,
+) -> None:
     """Write a copy of a parameter file in which some parameters have other values, for every node.
 
     Args:
@@ -189,6 +256,7 @@ def write_changed(source: Path | None, changes: Mapping[str, Any], path: Path, r
         changes: values by dotted names.
         path: of the copy.
         remark: its first line.
+        uncertainty: how well the rig is known now, in the place of what the file says.
 
     """
     sections = read_yaml(source) if source else {}
@@ -197,6 +265,12 @@ def write_changed(source: Path | None, changes: Mapping[str, Any], path: Path, r
         for section, tree in sections.items()
     }
     content[_EVERY_NODE] = {**content.get(_EVERY_NODE, {}), **changes}
+    if uncertainty:
+        rows = zip(uncertainty.errors, uncertainty.correlations.tolist(), strict=True)
+        content[_UNCERTAINTY] = {
+            **{f'{_ERRORS}.{name}': float(error) for name, error in uncertainty.errors.items()},
+            **{f'{_CORRELATIONS}.{name}': row[:place] for place, (name, row) in enumerate(rows) if place},
+        }
     text = yaml_text({section: {_PARAMETERS: values} for section, values in content.items()})
     path.write_text(f'# {remark}\n{text}', encoding='utf-8')
 

@@ -42,6 +42,7 @@ from dcdrw_sim.motion.taylor import (
     Row,
     Table,
     bare,
+    evaluate,
     expand,
     friction_step,
     minimum,
@@ -109,12 +110,15 @@ TIME_OVER, STRIKES, STANDING, FALLEN, STALLED, HUBS_MET = (int(end) for end in E
     TANGENT,
     LOW,
     HIGH,
+    SAMPLED,
     SIZE,
-) = range(taylor.END, taylor.END + 34 * LANES, LANES)
+) = range(taylor.END, taylor.END + 35 * LANES, LANES)
 NEWTON_ITERATIONS = 2
 """Iterations that take the error of the inverse cubic down to rounding, mostly."""
 CONVERGED = 1e-7
 """Last correction of Newton's method that leaves rounding error after it."""
+MOST_STRIKES = 10_000
+"""Room for those of a pair whose samples alone are asked for."""
 
 
 class Ensemble(NamedTuple):
@@ -183,26 +187,69 @@ def run_pairs(
         MotionError: a motion is too fast to follow.
 
     """
-    starts, count = np.ascontiguousarray(states, float), len(rigs.k)
-    if starts.shape != (count, 4):
-        raise ValueError(f'states must be of shape (N, 4), got {starts.shape}')
+    starts = _accepted_starts(rigs, states)
     if not (seconds >= 0.0 and capacity >= 1 and tolerance > 0.0):
         raise ValueError(
             f'seconds must be ≥ 0, capacity ≥ 1 and tolerance > 0, got {seconds}, {capacity} and {tolerance}'
         )
-    free = np.full(count, math.inf)
-    limits = np.column_stack([rigs.front.alpha, free, rigs.rear.alpha, free]) * (1 + 1e-12)
-    if not (np.isfinite(starts) & (np.abs(starts) <= limits)).all():
-        raise ValueError('states must be finite, their angles within ±α of their wheels')
-    ensemble = _blank(count, capacity)
-    if count:
-        with np.errstate(all='ignore'):
-            _run(_aligned(SIZE), _parameters(rigs), starts, float(seconds), float(tolerance), rubs(rigs), *ensemble)
+    ensemble = _blank(len(starts), capacity)
+    _follow(rigs, starts, seconds, tolerance, ensemble, None, None)
     if strict and (lost := np.flatnonzero(ensemble.ends == TOO_FAST)).size:
         raise MotionError(
             f'the motion of pair {lost[0]} at t = {ensemble.durations[lost[0]]:.9g} s is too fast to follow'
         )
     return ensemble
+
+
+def sample_pairs(rigs: Rigs, states: Floats, times: Floats, tolerance: float = ENSEMBLE_TOLERANCE) -> Floats:
+    """How far the wheels of many pairs have turned at given times, each pair of its own rig.
+
+    ψ of each wheel as its stance spoke at the start counts it: θ + 2α n. Where a pair ends (`End`) it stays as it was.
+
+    Args:
+        rigs: of N pairs, as `spread` and `take` give them.
+        states: [θ1, ω1, θ2, ω2] of each pair, as `run_ensemble`; shape (N, 4).
+        times: since the start [s], ascending; shape (T,).
+        tolerance: of the angles' series [rad].
+
+    Returns:
+        ψ1 and ψ2 [rad], shape (N, T, 2).
+
+    Raises:
+        ValueError: an impossible state.
+
+    """
+    starts = _accepted_starts(rigs, states)
+    rotations = np.empty((len(starts), len(times), 2))
+    _follow(rigs, starts, float(times[-1]), tolerance, _blank(len(starts), MOST_STRIKES), times, rotations)
+    return rotations
+
+
+def _accepted_starts(rigs: Rigs, states: ArrayLike) -> Floats:
+    """The states of N pairs, which are possible."""
+    starts, count = np.ascontiguousarray(states, float), len(rigs.k)
+    if starts.shape != (count, 4):
+        raise ValueError(f'states must be of shape (N, 4), got {starts.shape}')
+    free = np.full(count, math.inf)
+    limits = np.column_stack([rigs.front.alpha, free, rigs.rear.alpha, free]) * (1 + 1e-12)
+    if not (np.isfinite(starts) & (np.abs(starts) <= limits)).all():
+        raise ValueError('states must be finite, their angles within ±α of their wheels')
+    return starts
+
+
+def _follow(
+    rigs: Rigs,
+    starts: Floats,
+    seconds: float,
+    tolerance: float,
+    ensemble: Ensemble,
+    times: Floats | None,
+    rotations: Floats | None,
+) -> None:
+    if len(starts):
+        work, parameters = _aligned(SIZE), _parameters(rigs)
+        with np.errstate(all='ignore'):
+            _run(work, parameters, starts, float(seconds), float(tolerance), rubs(rigs), times, rotations, *ensemble)
 
 
 def spread(rig: RigParams, count: int, columns: Mapping[str, ArrayLike]) -> Rigs:
@@ -431,6 +478,27 @@ def _strike(w: Table, l: int, i: int, direction: int) -> int:
 
 
 @compiled
+def _sample(w: Table, l: int, times: Floats, rotations: Floats) -> None:
+    """Note how far the wheels have turned at those of the times that lie in the step that begins."""
+    at = int(w[SAMPLED + l])
+    while at < len(times) and times[at] <= w[TIME + l] + w[STEP + l]:
+        for i in range(2):
+            theta = evaluate(w, STATE[2 * i], l, times[at] - w[TIME + l])
+            rotations[at, i] = theta + 2.0 * w[taylor.ALPHA1 + i * LANES + l] * w[STEPS1 + i * LANES + l]
+        at += 1
+    w[SAMPLED + l] = at
+
+
+@compiled
+def _hold(w: Table, l: int, rotations: Floats) -> None:
+    """Note where a pair ended for all times that are left."""
+    for at in range(int(w[SAMPLED + l]), len(rotations)):
+        for i in range(2):
+            turned = 2.0 * w[taylor.ALPHA1 + i * LANES + l] * w[STEPS1 + i * LANES + l]
+            rotations[at, i] = w[STATE[2 * i] + l] + turned
+
+
+@compiled
 def _run(
     work: Floats,
     parameters: Floats,
@@ -438,6 +506,8 @@ def _run(
     seconds: float,
     tolerance: float,
     friction: Present,
+    times: Floats | None,
+    rotations: Floats | None,
     records: NDArray[np.void],
     counts: NDArray[np.int64],
     ends: NDArray[np.int64],
@@ -457,6 +527,8 @@ def _run(
                 if _load(w, l, parameters[following], starts[following]):
                     ends[following] = STANDING
                     tails[following, 0], tails[following, 1] = _phase_range(w, l)
+                    if times is not None and rotations is not None:
+                        _hold(w, l, rotations[following])
                 else:
                     w[PAIR + l] = following
                     active += 1
@@ -479,6 +551,10 @@ def _run(
             if (w[RATE + l] * w[RATE_AHEAD + l] < 0.0 or w[RATE + l] * w[TANGENT + l] < 0.0) and w[PAIR + l] != NO_PAIR:
                 least, greatest = phase_extremes(w, l, w[PITCH1 + l], w[PITCH2 + l], w[STEP + l])
                 w[LOW + l], w[HIGH + l] = min(w[LOW + l], least), max(w[HIGH + l], greatest)
+        if times is not None and rotations is not None:
+            for l in range(LANES):
+                if w[PAIR + l] != NO_PAIR:
+                    _sample(w, l, times, rotations[int(w[PAIR + l])])
         lanes[THETA1], lanes[OMEGA1], lanes[THETA2], lanes[OMEGA2] = theta1, omega1, theta2, omega2
         lanes[RATE] = lanes[RATE_AHEAD]
         lanes[TIME] = lanes[TIME] + lanes[STEP]
@@ -504,4 +580,6 @@ def _run(
             if end != NONE_YET:
                 ends[mine], durations[mine], w[PAIR + l] = end, w[TIME + l], NO_PAIR
                 tails[mine, 0], tails[mine, 1] = _phase_range(w, l)
+                if times is not None and rotations is not None:
+                    _hold(w, l, rotations[mine])
                 active -= 1

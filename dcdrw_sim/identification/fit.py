@@ -1,0 +1,268 @@
+"""Least squares: the rig, and each trial's start, under which the model's samples are nearest to those of the trials.
+
+Samples of an angle are continuous functions of all parameters, strikes and all: only speeds jump. Their derivatives are
+differences of trajectories that run side by side, as one ensemble.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.optimize import least_squares
+
+from dcdrw_msgs_py.rolling import stance_distance
+from dcdrw_msgs_py.values import Floats
+from dcdrw_sim.identification.samples import Samples
+from dcdrw_sim.identification.unknowns import Knowledge
+from dcdrw_sim.motion.ensemble import sample_pairs, spread
+
+TOLERANCE = 1e-13
+"""Of the trajectories' series [rad]: what is left of a difference over STEP is 1e-6 of it."""
+STEP = 1e-6
+"""Over which derivatives are taken, in the widths of what is known, and in rad and rad/s of a start."""
+WINDOWS = 1.5, 3.0, 6.0
+"""The first part of each trial is explained before more of it [s]: so far a phase drifts by less than a step."""
+ROBUST = 4.0
+"""Residuals of more than so many standard deviations weigh less and less."""
+OUTLYING = 5.0
+"""Residuals of more than so many standard deviations are left out in the end."""
+COARSEST = math.radians(0.01)
+"""Least noise that is assumed at first [rad]."""
+ROUGHLY, SETTLED = 1e-3, 1e-6
+"""Part of the sum of squares, or of the parameters, by which a last step changes them: on the way, and in the end."""
+INSIDE = 0.15, 0.5, 1.0
+"""Searches begin so far from lower bounds at least, in the widths of what is known: gyration and restitution have
+several valleys."""
+EVALUATIONS = 60
+"""At most, of one search."""
+Mask = NDArray[np.bool_]
+
+
+class Explained(NamedTuple):
+    """A trial and what the model makes of it."""
+
+    samples: Samples
+    start: Floats
+    """[θ1, ω1, θ2, ω2] at the first sample."""
+    residuals: Floats
+    """What was measured less what the model has [rad], shape (T, 2)."""
+    outliers: Mask
+    """Shape (T, 2)."""
+    noise: float
+    """Standard deviation of the residuals, outliers left out [rad]."""
+    memory: float
+    """By how much the mean of many residuals varies more than if they were independent, ≥ 1."""
+
+    @property
+    def deviation(self) -> float:
+        """What a sample weighs: the noise, greater where one residual resembles the next [rad]."""
+        return self.noise * math.sqrt(self.memory)
+
+
+class Problem:
+    """Residuals and their derivatives.
+
+    Args:
+        known: of the rig.
+        trials: to be explained.
+        deviations: standard deviation of each trial's samples [rad].
+        used: samples of each trial that count, shape (T, 2); None: all.
+
+    """
+
+    def __init__(
+        self,
+        known: Knowledge,
+        trials: Sequence[Samples],
+        deviations: Sequence[float],
+        used: Sequence[Mask] | None = None,
+    ) -> None:
+        self.known, self.trials, self._deviations = known, trials, deviations
+        self._used = used or [np.ones(trial.rotations.shape, bool) for trial in trials]
+        self._size = len(known.unknowns)
+        self._steps = STEP * np.sqrt(np.diag(known.covariance))
+        self._root = np.linalg.cholesky(known.covariance)
+        self._at: Floats = np.empty(0)
+        self._found: tuple[Floats, Floats] = (self._at, self._at)
+        front, rear = known.rig.front, known.rig.rear
+        farthest = np.tile([front.alpha, math.inf, rear.alpha, math.inf], len(trials))
+        low, high = known.bounds()
+        self.low, self.high = np.concatenate([low, -farthest]), np.concatenate([high, farthest])
+
+    def rotations(self, trial: int, points: Floats) -> Floats:
+        """ψ of a trial's samples [rad] at N points: coordinates and the trial's start, shape (N, T, 2)."""
+        columns = {
+            name: column
+            for unknown, coordinates in zip(self.known.unknowns, points.T, strict=False)
+            for name, column in unknown.columns(coordinates).items()
+        }
+        rig, samples = self.known.rig, self.trials[trial]
+        rig = rig._replace(S0=float(stance_distance(rig.front, rig.rear, rig.S0, samples.steps, 0)))
+        return sample_pairs(spread(rig, len(points), columns), points[:, self._size :], samples.seconds, TOLERANCE)
+
+    def residuals(self, x: Floats) -> Floats:
+        """Weighed residuals, then what the unknowns are off from what was known, in standard deviations."""
+        return self._evaluate(x)[0]
+
+    def jacobian(self, x: Floats) -> Floats:
+        """Derivatives of the residuals."""
+        return self._evaluate(x)[1]
+
+    def _evaluate(self, x: Floats) -> tuple[Floats, Floats]:
+        if np.array_equal(x, self._at):
+            return self._found
+        size, residuals, blocks = self._size, [], []
+        for index, (samples, used, deviation) in enumerate(zip(self.trials, self._used, self._deviations, strict=True)):
+            own = [*range(size), *range(size + 4 * index, size + 4 * index + 4)]
+            steps = np.concatenate([self._steps, np.full(4, STEP)])
+            steps = np.where(x[own] + steps > self.high[own], -steps, steps)
+            rotations = self.rotations(index, x[own] + np.vstack([np.zeros(len(own)), np.diag(steps)]))
+            residuals.append((rotations[0] - samples.rotations)[used] / deviation)
+            block = np.zeros((np.count_nonzero(used), len(x)))
+            block[:, own] = (rotations[1:] - rotations[0])[:, used].T / steps / deviation
+            blocks.append(block)
+        residuals.append(solve_triangular(self._root, x[:size] - self.known.coordinates, lower=True))
+        before = np.zeros((size, len(x)))
+        before[:, :size] = solve_triangular(self._root, np.eye(size), lower=True)
+        self._at, self._found = x.copy(), (np.concatenate(residuals), np.vstack([*blocks, before]))
+        return self._found
+
+    def misfit(self, x: Floats) -> float:
+        """The sum that a robust `solve` makes small."""
+        squares = (self.residuals(x) / ROBUST) ** 2
+        return float(np.sum(np.sqrt(1.0 + squares) - 1.0))
+
+    def squares(self, x: Floats) -> float:
+        """The sum that a `solve` which is not robust makes small: minus twice the logarithm of the likelihood."""
+        return float(np.sum(self.residuals(x) ** 2))
+
+    def held(self, index: int, coordinate: float) -> tuple['Problem', float]:
+        """The same with one unknown held, and what that adds to the squares."""
+        known, square = self.known.held(index, coordinate)
+        return Problem(known, self.trials, self._deviations, self._used), square
+
+    def solve(self, x: Floats, robust: bool = True, settled: float = ROUGHLY) -> Floats:
+        """The best point, from x on."""
+        inside = np.clip(x, self.low, self.high)
+        found = least_squares(
+            self.residuals,
+            inside,
+            self.jacobian,
+            bounds=(self.low, self.high),
+            method='dogbox',
+            x_scale='jac',
+            loss='soft_l1' if robust else 'linear',
+            f_scale=ROBUST,
+            ftol=settled,
+            xtol=1e-8,
+            gtol=1e-10,
+            max_nfev=EVALUATIONS,
+        )
+        best: Floats = found.x
+        return best
+
+    def information(self, x: Floats) -> Floats:
+        """What the trials tell of the unknowns, their starts being unknown: an inverse covariance, shape (P, P)."""
+        size = self._size
+        weighed = self.jacobian(x)[:-size]
+        whole = weighed.T @ weighed
+        cross, starts = whole[:size, size:], whole[size:, size:]
+        return np.asarray(whole[:size, :size] - cross @ np.linalg.solve(starts, cross.T))
+
+
+class Fit(NamedTuple):
+    """The outcome of least squares."""
+
+    problem: Problem
+    """As it was solved in the end."""
+    point: Floats
+    """Its solution: coordinates, then each trial's start."""
+    whole_covariance: Floats
+    """Of the point."""
+    trials: tuple[Explained, ...]
+
+    @property
+    def known(self) -> Knowledge:
+        """What was known of the rig before."""
+        return self.problem.known
+
+    @property
+    def coordinates(self) -> Floats:
+        """Of the unknowns, shape (P,)."""
+        return self.point[: len(self.known.unknowns)]
+
+    @property
+    def covariance(self) -> Floats:
+        """Of these, shape (P, P)."""
+        size = len(self.known.unknowns)
+        return self.whole_covariance[:size, :size]
+
+    @property
+    def after(self) -> Knowledge:
+        """What is known of the rig now."""
+        return self.known._replace(coordinates=self.coordinates, covariance=self.covariance)
+
+
+def identify(known: Knowledge, trials: Sequence[Samples]) -> Fit:
+    """The rig that explains trials best, beside what was known of it.
+
+    From the first seconds on to the whole, so that a phase that drifts does not lead astray; outliers lose their weight
+    first, and are left out at last. The noise is that of the residuals; where one resembles the next, fewer count.
+
+    Args:
+        known: of the rig before.
+        trials: at least one.
+
+    Raises:
+        ValueError: the rig is impossible.
+
+    """
+    rough = [max(trial.noise(), COARSEST) for trial in trials]
+    states = [trial.first_state() for trial in trials]
+    first = [Problem(known, [trial.until(window) for trial in trials], rough) for window in WINDOWS]
+    ends = []
+    for inside in INSIDE:
+        least = known.bounds()[0] + inside * np.sqrt(np.diag(known.covariance))
+        x = np.concatenate([np.maximum(known.coordinates, least), *states])
+        for problem in first:
+            x = problem.solve(x)
+        ends.append(x)
+    whole = Problem(known, trials, rough)
+    x = whole.solve(min(ends, key=first[-1].misfit))
+    explained = _explained(whole, x)
+    used = [~one.outliers for one in explained]
+    problem = Problem(known, trials, [one.deviation for one in explained], used)
+    x = problem.solve(x, robust=False, settled=SETTLED)
+    explained = _explained(problem, x)
+    problem = Problem(known, trials, [one.deviation for one in explained], used)
+    derivatives = problem.jacobian(x)
+    return Fit(problem, x, np.linalg.inv(derivatives.T @ derivatives), tuple(explained))
+
+
+def _explained(problem: Problem, x: Floats) -> list[Explained]:
+    size, found = len(problem.known.unknowns), []
+    for index, samples in enumerate(problem.trials):
+        start = x[size + 4 * index : size + 4 * index + 4]
+        rotations = problem.rotations(index, np.concatenate([x[:size], start])[None])[0]
+        residuals = samples.rotations - rotations
+        spread_of = max(float(np.median(np.abs(residuals))) / 0.6745, 1e-9)
+        outliers = np.abs(residuals) > OUTLYING * spread_of
+        noise = float(np.sqrt(np.mean(residuals[~outliers] ** 2)))
+        found.append(Explained(samples, start, residuals, outliers, max(noise, 1e-9), _memory(residuals, outliers)))
+    return found
+
+
+def _memory(residuals: Floats, outliers: Mask) -> float:
+    """1 + 2 Σ ρ_k, over the first lags k at which the correlation ρ_k of residuals is beyond chance."""
+    kept: Any = np.where(outliers, 0.0, residuals)
+    kept = kept - kept.mean(axis=0)
+    power, count, total = float((kept**2).sum()), len(kept), 1.0
+    for lag in range(1, count // 10):
+        part = float((kept[lag:] * kept[:-lag]).sum()) / max(power, 1e-300)
+        if part < 2.0 / math.sqrt(2.0 * count):
+            break
+        total += 2.0 * part
+    return total
