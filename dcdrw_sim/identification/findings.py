@@ -10,7 +10,7 @@ import numpy as np
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.rolling import default_rest_length
 from dcdrw_msgs_py.values import Floats
-from dcdrw_sim.identification.fit import Explained, Fit, Problem
+from dcdrw_sim.identification.fit import SETTLED, Explained, Fit, Problem
 from dcdrw_sim.identification.unknowns import Form, Knowledge, correlation
 from dcdrw_sim.model.start import start
 from dcdrw_sim.model.wheel import kept
@@ -27,8 +27,8 @@ TOLERATED = 0.01
 """... unless they are below this part of α: spokes are no straighter."""
 MOST_OUTLIERS = 0.1
 """A trial of more outliers is not explained."""
-PROFILE = (-2.0, -1.0, 1.0, 2.0)
-"""Where profiles are computed, in standard errors."""
+PROFILE = (0.7, 1.4, 2.0)
+"""Where profiles are computed on either side, in standard errors."""
 FURTHER_PHASES = (0.15, 0.5, 0.85)
 """Starts of a further trial that are thought through."""
 PIECES = 20
@@ -192,8 +192,8 @@ def gains(fit: Fit) -> list[Gain]:
             information = _further(fit, phase)
         except ValueError:  # no wheel of this rig rolls by itself
             continue
-        covariance = np.linalg.inv(np.linalg.inv(fit.covariance) + information)
-        found.append(_gain(fit, f'another trial as long, begun at {100 * phase:.0f} %', covariance))
+        combined = np.asarray(np.linalg.inv(np.linalg.inv(fit.covariance) + information), float)
+        found.append(_gain(fit, f'another trial as long, begun at {100 * phase:.0f} %', combined))
     return sorted(found, key=lambda gain: -gain.score)
 
 
@@ -253,15 +253,18 @@ def profiles(fit: Fit) -> list[Profile]:
         along = fit.whole_covariance[:, index] / errors[index]
         low, high = (bound[index] for bound in fit.known.bounds())
         values, deviances = [fit.coordinates[index]], [0.0]
-        for factor in PROFILE:
-            value = fit.coordinates[index] + factor * errors[index]
-            if not low <= value <= high:
-                continue
-            held, deviance = fit.problem.held(index, value)
-            point = np.delete(fit.point + factor * along, index)
-            point = held.solve(point, robust=False, settled=1e-4)
-            values.append(value)
-            deviances.append(held.squares(point) + deviance - best)
+        for way in (-1.0, 1.0):
+            point = fit.point
+            for factor in PROFILE:
+                value = fit.coordinates[index] + way * factor * errors[index]
+                if not low <= value <= high:
+                    break
+                held, more = fit.problem.held(index, value)
+                others = point + (value - point[index]) / errors[index] * along
+                others = held.solve(np.delete(others, index), robust=False, settled=SETTLED)
+                values.append(value)
+                deviances.append(held.squares(others) + more - best)
+                point = np.insert(others, index, value)
         order = np.argsort(values)
         found.append(
             Profile(unknown.name, np.array([unknown.shown(values[i]) for i in order]), np.array(deviances)[order])

@@ -36,6 +36,8 @@ ROUGHLY, SETTLED = 1e-3, 1e-6
 INSIDE = 0.15, 0.5, 1.0
 """Searches begin so far from lower bounds at least, in the widths of what is known: gyration and restitution have
 several valleys."""
+WORTHWHILE = 0.1
+"""What a search begun anew must gain [of squares in standard deviations] to be followed by another."""
 EVALUATIONS = 60
 """At most, of one search."""
 Mask = NDArray[np.bool_]
@@ -139,6 +141,26 @@ class Problem:
         """The sum that a `solve` which is not robust makes small: minus twice the logarithm of the likelihood."""
         return float(np.sum(self.residuals(x) ** 2))
 
+    def covariance(self, x: Floats) -> Floats:
+        """Of the point that a `solve` which is not robust found."""
+        derivatives = self.jacobian(x)
+        return np.asarray(np.linalg.inv(derivatives.T @ derivatives))
+
+    def released(self, x: Floats) -> Floats:
+        """A better point than x, where the search that led there stuck to a bound, else x.
+
+        Each unknown that lies on its bound is let go, all others following as their errors correlate.
+        """
+        best, before = x, math.inf
+        while self.squares(best) < before - WORTHWHILE:
+            before = self.squares(best)
+            for index in np.flatnonzero(x[: self._size] <= self.low[: self._size] + self._steps):
+                column = self.covariance(best)[:, index]
+                moved = best + column / math.sqrt(column[index])
+                found = self.solve(moved, robust=False, settled=SETTLED)
+                best = min(best, found, key=self.squares)
+        return best
+
     def held(self, index: int, coordinate: float) -> tuple['Problem', float]:
         """The same with one unknown held, and what that adds to the squares."""
         known, square = self.known.held(index, coordinate)
@@ -235,11 +257,10 @@ def identify(known: Knowledge, trials: Sequence[Samples]) -> Fit:
     explained = _explained(whole, x)
     used = [~one.outliers for one in explained]
     problem = Problem(known, trials, [one.deviation for one in explained], used)
-    x = problem.solve(x, robust=False, settled=SETTLED)
+    x = problem.released(problem.solve(x, robust=False, settled=SETTLED))
     explained = _explained(problem, x)
     problem = Problem(known, trials, [one.deviation for one in explained], used)
-    derivatives = problem.jacobian(x)
-    return Fit(problem, x, np.linalg.inv(derivatives.T @ derivatives), tuple(explained))
+    return Fit(problem, x, problem.covariance(x), tuple(explained))
 
 
 def _explained(problem: Problem, x: Floats) -> list[Explained]:

@@ -67,7 +67,8 @@ def free_rolling(rig: RigParams, seconds: Floats, rotations: Floats) -> Samples:
     seconds, rotations = seconds[seen], rotations[seen]
     end = _first_rest(seconds, rotations)
     alphas = np.array([rig.front.alpha, rig.rear.alpha])
-    spokes, thetas = np.moveaxis([stance(alpha, psi) for alpha, psi in zip(alphas, rotations.T, strict=True)], 0, -1)
+    of_wheels = [stance(alpha, psi) for alpha, psi in zip(alphas, rotations.T, strict=True)]
+    spokes, thetas = (np.stack(columns, axis=1) for columns in zip(*of_wheels, strict=True))
     calm = np.flatnonzero((np.abs(thetas[:end]) < alphas - AWAY).all(axis=1))
     if not calm.size or end - calm[0] < FEWEST:
         raise ValueError(f'both wheels roll in {max(end, 0)} samples only: nothing can be told of them')
