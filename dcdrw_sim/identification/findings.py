@@ -10,7 +10,7 @@ import numpy as np
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.rolling import default_rest_length
 from dcdrw_msgs_py.values import Floats
-from dcdrw_sim.identification.fit import SETTLED, Explained, Fit, Problem
+from dcdrw_sim.identification.fit import Explained, Fit, Problem
 from dcdrw_sim.identification.unknowns import Form, Knowledge, correlation
 from dcdrw_sim.model.start import start
 from dcdrw_sim.model.wheel import kept
@@ -27,8 +27,10 @@ TOLERATED = 0.01
 """... unless they are below this part of α: spokes are no straighter."""
 MOST_OUTLIERS = 0.1
 """A trial of more outliers is not explained."""
-PROFILE = (0.7, 1.4, 2.0)
-"""Where profiles are computed on either side, in standard errors."""
+WELL = 1e-5
+"""Part of the squares by which a profile's last step changes them: by little beside 1."""
+PROFILE, QUICK = (0.9, 1.8), 10
+"""Where profiles are computed on either side, in standard errors; and evaluations for each at most."""
 FURTHER_PHASES = (0.15, 0.5, 0.85)
 """Starts of a further trial that are thought through."""
 PIECES = 20
@@ -261,7 +263,7 @@ def profiles(fit: Fit) -> list[Profile]:
                     break
                 held, more = fit.problem.held(index, value)
                 others = point + (value - point[index]) / errors[index] * along
-                others = held.solve(np.delete(others, index), robust=False, settled=SETTLED)
+                others = held.solve(np.delete(others, index), robust=False, settled=WELL, evaluations=QUICK)
                 values.append(value)
                 deviances.append(held.squares(others) + more - best)
                 point = np.insert(others, index, value)

@@ -166,7 +166,7 @@ class Problem:
         known, square = self.known.held(index, coordinate)
         return Problem(known, self.trials, self._deviations, self._used), square
 
-    def solve(self, x: Floats, robust: bool = True, settled: float = ROUGHLY) -> Floats:
+    def solve(self, x: Floats, robust: bool = True, settled: float = ROUGHLY, evaluations: int = EVALUATIONS) -> Floats:
         """The best point, from x on."""
         inside = np.clip(x, self.low, self.high)
         found = least_squares(
@@ -181,7 +181,7 @@ class Problem:
             ftol=settled,
             xtol=1e-8,
             gtol=1e-10,
-            max_nfev=EVALUATIONS,
+            max_nfev=evaluations,
         )
         best: Floats = found.x
         return best
