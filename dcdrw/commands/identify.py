@@ -11,6 +11,7 @@ from dcdrw.console import add_json, check_json, number, tell, tell_where
 from dcdrw.drawings.figure_files import add_formats, figure_files, write_figure
 from dcdrw.files import add_force, refuse_existing, to_json, write_text
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file, read_uncertainty, write_changed
+from dcdrw.trials.motion import Whole
 from dcdrw.trials.results import read_trial
 from dcdrw.trials.rolling import rolling_samples
 from dcdrw_msgs_py.quantity import flatten
@@ -100,11 +101,12 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError('everything is fixed: there is nothing to identify')
     trials = []
     for path in options.recordings:
-        trial, _ = read_trial(path, rig=options.rig, topic=options.topic, namespace=options.namespace)
+        whole = Whole()
+        trial, _ = read_trial(path, None, options.rig, options.topic, options.namespace, [whole])
         for text in (*trial.damage, *trial.notes):
             print(f'dcdrw identify: {text}', file=sys.stderr)
         try:
-            trials.append(rolling_samples(trial, known.rig, options.begin, options.end))
+            trials.append(rolling_samples(trial, whole.motion, known.rig, options.begin, options.end))
         except ValueError as error:
             raise ValueError(f'{path}: {error}') from None
     fit = identify(known, trials)

@@ -5,15 +5,19 @@ import math
 import numpy as np
 
 from dcdrw.trials.analysis import Analysis
+from dcdrw.trials.motion import MotionTable
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.identification.samples import Samples, free_rolling
 
 
-def rolling_samples(trial: Analysis, rig: RigParams, begin: float = 0.0, end: float = math.inf) -> Samples:
+def rolling_samples(
+    trial: Analysis, motion: MotionTable, rig: RigParams, begin: float = 0.0, end: float = math.inf
+) -> Samples:
     """The samples of the last run of a trial, from one time to another, as far as both wheels roll.
 
     Args:
         trial: as it was analyzed.
+        motion: all its samples.
         rig: whose wheels they are.
         begin: time in the trial [s].
         end: likewise.
@@ -22,7 +26,8 @@ def rolling_samples(trial: Analysis, rig: RigParams, begin: float = 0.0, end: fl
         ValueError: there are too few.
 
     """
-    motion = trial.motion.rows(slice(trial.judged, None))
+    if trial.resumed:
+        motion = motion.rows(motion.row >= trial.resumed.row)
     if not len(motion.stamp_ns):
         raise ValueError(trial.why_not_run or 'there are no joint states')
     seconds = motion.seconds
