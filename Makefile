@@ -5,9 +5,12 @@ ifdef ROS_DISTRO
 VENV := .venv-$(ROS_DISTRO)
 VENV_FLAGS := --system-site-packages
 EXTRAS := figures,speed,record,live,sweep,test,lint
+# The system's versions stay.
+CONSTRAINTS :=
 else
 VENV := .venv
 EXTRAS := ros,figures,speed,camera,apriltag,record,live,sweep,test,lint
+CONSTRAINTS := --constraint constraints.txt
 # The wheels' loader marks its environment; another environment's mark must not reach ours.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 endif
@@ -69,11 +72,11 @@ $(VENV)/.docs $(VENV)/.dist: $(READY)
 	@$(BIN)/python -m pip install --disable-pip-version-check -e '.[$(subst .,,$(@F))]'
 	@touch $@
 
-$(READY): setup.cfg setup.py
+$(READY): setup.cfg setup.py constraints.txt
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; (3, 10) <= v <= (3, 13) or sys.exit(f"python3 is {v[0]}.{v[1]}; rclpy needs 3.10 to 3.13: make PYTHON=python3.12 ...")'
 	@echo 'Setting up $(VENV) (once): numpy, scipy and what these need: $(EXTRAS) ...'
 	@$(PYTHON) -m venv $(VENV_FLAGS) $(VENV)
-	@$(BIN)/python -m pip install --disable-pip-version-check -e '.[$(EXTRAS)]'
+	@$(BIN)/python -m pip install --disable-pip-version-check $(CONSTRAINTS) -e '.[$(EXTRAS)]'
 	@touch $@
 
 clean:
