@@ -1,6 +1,7 @@
 """The ensemble's speed beside that of SciPy, of the scalar simulation and of heyoka, at matched accuracy.
 
     python benchmarks/trajectories.py [--points 120] [--seconds 3]
+    python benchmarks/trajectories.py --points 1000 --seconds 60 --against 47104d3
 
 The workload is the paper's sweep, without dimensions: γ = 1.75°, S0 = 1, D0 = S0 + sin α, k̂ from 1e-4 to 1e-2 and b̂
 from 0.1 to 10 in even steps of their logarithms, seven initial θ2, the front wheel just after a strike, each wheel with
@@ -16,16 +17,26 @@ tolerances are set so that the 99th percentile is just below 1e-9, or as near to
 allows. `--seconds` is the time for which a quick program is repeated; its best repetition counts. A busy machine slows
 all programs alike: compare ratios.
 
+--against takes the ensemble of an earlier commit in the same run, a process each, in turns; 47104d3 is the last whose
+model has no gyration, restitution, friction and rolling resistance. It has no extremes between strikes either, so that
+they are left out of what is told as `bare`.
+
 SciPy and heyoka are given the same form of the equations; heyoka, where it is installed, as expressions of its own,
 its strikes as terminal events, once one trajectory at a time and once in batches as wide as it recommends and twice so.
 Goal: the ensemble at least 500 times as fast as SciPy, and faster than heyoka's batches.
 """
 
 import argparse
+import io
 import math
+import os
+import subprocess
 import sys
+import tarfile
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,6 +52,7 @@ from dcdrw_sim.motion.compiled import AVAILABLE
 from dcdrw_sim.motion.ends import BACKWARD, End
 from dcdrw_sim.motion.ensemble import run_ensemble
 
+BARE = 'bare'  # as ensemble_speed.py knows it
 SCIPY_TOLERANCE = 3e-13
 TAYLOR_TOLERANCE = 1e-13  # of the simulation and of the ensemble
 HEYOKA_TOLERANCE = 2e-11  # it chooses its order by this: from 3e-11 on the error is 1.7e-9
@@ -278,15 +290,72 @@ def programs() -> Iterator[Program]:
         yield f'{name}, {HEYOKA_TOLERANCE:g}', Heyoka(heyoka, width), 1
 
 
+def compare(points: Points, commit: str, seconds: float) -> None:
+    """Time the ensemble of an earlier commit beside this one's, in turns; print the best of each, and the ratios."""
+    here = Path(__file__).resolve().parents[1]
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        np.savez(folder / 'points.npz', **points._asdict())
+        packages = subprocess.run(
+            ['git', '-C', str(here), 'archive', commit, 'dcdrw_sim', 'dcdrw_msgs_py'], check=True, capture_output=True
+        ).stdout
+        with tarfile.open(fileobj=io.BytesIO(packages)) as archive:
+            archive.extractall(folder / 'earlier', filter='data')
+        gyration = [f'{wheel}.gyration=0.5' for wheel in ('front', 'rear')]
+        programs = {
+            f'at {commit[:10]}': _timer(folder, folder / 'earlier'),
+            'now, bare': _timer(folder, here, BARE),
+            'now, bare, gyration': _timer(folder, here, BARE, *gyration),
+            'now': _timer(folder, here),
+        }
+        times: dict[str, list[list[float]]] = {name: [] for name in programs}
+        for ask in programs.values():
+            ask()  # compiles
+        until = time.perf_counter() + seconds
+        while time.perf_counter() < until:
+            for name, ask in programs.items():
+                times[name].append(ask())
+    print(f'{"":24}{"µs":>10}{"µs/strike":>12}{"ratio, of a strike":>20}')
+    best = {name: np.min(taken, axis=0) for name, taken in times.items()}
+    earlier = next(iter(best.values()))
+    for name, (each, strike) in best.items():
+        print(f'{name:24}{each:10.2f}{strike:12.4f}{strike / earlier[1]:20.3f}')
+
+
+def _timer(folder: Path, packages: Path, *columns: str) -> Callable[[], list[float]]:
+    """A process that times the ensemble of some packages once for each call."""
+    script = Path(__file__).with_name('children') / 'ensemble_speed.py'
+    process = subprocess.Popen(
+        [sys.executable, '-P', str(script), str(folder / 'points.npz'), *columns],
+        env={**os.environ, 'PYTHONPATH': str(packages), 'NUMBA_CACHE_DIR': str(folder / f'numba{len(columns)}')},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+    def ask() -> list[float]:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        process.stdin.write('\n')
+        process.stdin.flush()
+        return [float(word) for word in process.stdout.readline().split()]
+
+    return ask
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=str(__doc__).partition('\n')[0])
     parser.add_argument('--points', type=int, default=120, help='trajectories that are drawn (default 120)')
     parser.add_argument('--seconds', type=float, default=3.0, help='time to repeat each quick program [s] (default 3)')
+    parser.add_argument('--against', metavar='COMMIT', help='compare with the ensemble of an earlier commit instead')
     options = parser.parse_args()
     if not AVAILABLE:
         print('numba is not installed, the ensemble runs as plain Python; to compile it: pip install numba')
     points = draw(sweep(), options.points)
+    if options.against:
+        compare(points, options.against, options.seconds)
+        return
     print(f'reference for {len(points.k)} of them …', file=sys.stderr)
     truth = reference(points)
     print(f'{"":34}{"µs":>10}{"× SciPy":>10}{"p99 error":>12}{"max error":>12}{"wrong":>8}')

@@ -1,0 +1,42 @@
+"""Time one repetition of an ensemble for each line on standard input: what `trajectories.py --against` measures by.
+
+It runs with the packages that PYTHONPATH names, also with older ones.
+"""
+
+import sys
+import time
+
+import numpy as np
+
+from dcdrw_sim.model.presets import preset
+
+BARE = 'bare'
+
+SECONDS, CAPACITY, TOLERANCE = 100.0, 400, 1e-13
+
+
+def main(points: str, *columns: str) -> None:
+    """Measure.
+
+    Args:
+        points: file of starts and couplers.
+        columns: parameters of all pairs, as `front.gyration=0.5`; BARE leaves out the extremes between strikes.
+
+    """
+    if BARE in columns:
+        from dcdrw_sim.motion import extremes
+
+        extremes.phase_extremes = lambda w, l, pitch1, pitch2, h: (0.0, 0.0)
+    from dcdrw_sim.motion.ensemble import run_ensemble
+
+    saved, rig = np.load(points), preset('paper-sweep').resolved()
+    given = {name: float(value) for name, _, value in (column.partition('=') for column in columns if column != BARE)}
+    for _ in sys.stdin:
+        start = time.perf_counter()
+        result = run_ensemble(rig, saved['states'], SECONDS, CAPACITY, TOLERANCE, k=saved['k'], b=saved['b'], **given)
+        taken = time.perf_counter() - start
+        print(1e6 * taken / len(saved['k']), 1e6 * taken / result.counts.sum(), flush=True)
+
+
+if __name__ == '__main__':
+    main(*sys.argv[1:])
