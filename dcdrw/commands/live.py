@@ -16,10 +16,10 @@ from typing import Any
 
 from dcdrw.console import domain, interrupted_status, interruptible, need
 from dcdrw.page.live_state import FRAMES_KEPT, Command, read_command
-from dcdrw.page.overlay import overlay
 from dcdrw.suite.executables import RECORDER, TRIAL
 from dcdrw.suite.parameter_file import TrialParams, add_rig_options, chosen_params, write_parameter_file
 from dcdrw.suite.processes import NodeProcess, free_domain
+from dcdrw.trials.overlay import overlay
 from dcdrw.trials.results import read_trial
 
 PORT = 8800

@@ -81,7 +81,7 @@ class PageServer:
         token: what a browser must know; empty: nothing, but it must be on this machine.
         kept: frames kept for browsers that come.
         on_command: told each message of a browser, in the server's thread; raises ValueError where it is none.
-        over: an earlier trial to be drawn beneath the live one, as `dcdrw.page.overlay` makes it.
+        over: an earlier trial to be drawn beneath the live one, as `dcdrw.trials.overlay` makes it.
 
     """
 

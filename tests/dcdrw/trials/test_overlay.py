@@ -5,9 +5,9 @@ import math
 import pytest
 
 from dcdrw.page.live_state import LiveState
-from dcdrw.page.overlay import overlay
 from dcdrw.suite.parameter_file import TrialParams
 from dcdrw.trials.analysis import analyze
+from dcdrw.trials.overlay import overlay
 from dcdrw_msgs_py.samples import Turn
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams
 from tests.tracker.walking import PITCH, walk
