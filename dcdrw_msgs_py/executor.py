@@ -1,5 +1,6 @@
 """An executor for streams of messages: timers go on however many messages come, and queues stay bounded."""
 
+import math
 import time
 from typing import Any, NamedTuple
 
@@ -14,14 +15,22 @@ from dcdrw_msgs_py.topics import CLOCK
 
 TURN_SECONDS = 0.01
 """How long one subscription is read at most before timers, services and the other subscriptions have their turn [s]."""
+SELDOM_SECONDS = 0.01
+"""While messages and timers keep coming, services, clients and events are looked at so seldom [s]."""
+_STREAM_KINDS = ('subscription', 'timer', 'guard_condition')
 
 
-class _Entities(NamedTuple):
-    """What all nodes wait for."""
+class _Streams(NamedTuple):
+    """What all nodes wait for all the time."""
 
-    subscriptions: tuple[Any, ...]
-    guards: tuple[Any, ...]
-    timers: tuple[Any, ...]
+    subscriptions: tuple[Any, ...] = ()
+    guards: tuple[Any, ...] = ()
+    timers: tuple[Any, ...] = ()
+
+
+class _Seldom(NamedTuple):
+    """What happens seldom: several times as many, and each costs time in every wait."""
+
     clients: tuple[Any, ...]
     services: tuple[Any, ...]
     waitables: tuple[Any, ...]
@@ -37,7 +46,9 @@ class StreamExecutor(Executor):
     """
 
     _tasks: list[Any]
-    _known: _Entities | None = None
+    _streams = _Streams()
+    _seldom: _Seldom | None = None
+    _seldom_due = 0.0
     _wait_set: Any = None
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
@@ -51,46 +62,50 @@ class StreamExecutor(Executor):
 
         """
         self._run_tasks()
-        nodes = self.get_nodes()
-        entities = _Entities(
-            *(
-                tuple(entity for node in nodes for entity in getattr(node, kind))
-                for kind in ('subscriptions', 'guards', 'timers', 'clients', 'services', 'waitables')
-            )
-        )
-        if entities != self._known:
-            self._wait_set, self._known = self._make_wait_set(entities), entities
-        ready = self._wait(entities, timeout_sec_to_nsec(timeout_sec))
-        for timer in entities.timers:
+        end = math.inf if timeout_sec is None or timeout_sec < 0.0 else time.monotonic() + timeout_sec
+        streams = _Streams(*self._all_of(_Streams))
+        ready, seldom = set[int](), None
+        if streams == self._streams and time.monotonic() < self._seldom_due:
+            ready = self._wait(streams, None, min(end, self._seldom_due))
+        if not ready:
+            seldom = _Seldom(*self._all_of(_Seldom))
+            if (streams, seldom) != (self._streams, self._seldom):
+                self._streams, self._seldom = streams, seldom
+                self._wait_set = self._make_wait_set(streams, seldom)
+            ready = self._wait(streams, seldom, end)
+            self._seldom_due = time.monotonic() + SELDOM_SECONDS
+        for timer in streams.timers:
             if timer.handle.pointer in ready and timer.handle.is_timer_ready():
                 timer.handle.call_timer()
                 timer.callback()
-        for subscription in entities.subscriptions:
+        for subscription in streams.subscriptions:
             if subscription.handle.pointer in ready:
                 self._read(subscription)
-        for some, take in (
-            (entities.services, self._take_service),
-            (entities.clients, self._take_client),
-            (entities.guards, self._take_guard_condition),
-        ):
-            for entity in some:
-                if entity.handle.pointer in ready:
-                    self._handle(entity, take)
+        for guard in streams.guards:
+            if guard.handle.pointer in ready:
+                self._handle(guard, self._take_guard_condition)
+        if seldom:
+            self._see_to(seldom)
 
     def spin_once_until_future_complete(self, future: Any, timeout_sec: Any = None) -> None:
         """As `spin_once`; a future that is done ends the wait."""
         future.add_done_callback(lambda _: self.wake())
         self.spin_once(getattr(timeout_sec, 'timeout', timeout_sec))
 
-    def _make_wait_set(self, entities: _Entities) -> Any:
+    def _all_of(self, kinds: type[_Streams | _Seldom]) -> list[tuple[Any, ...]]:
+        """The entities of these kinds, of all nodes."""
+        nodes = self.get_nodes()
+        return [tuple(entity for node in nodes for entity in getattr(node, kind)) for kind in kinds._fields]
+
+    def _make_wait_set(self, streams: _Streams, seldom: _Seldom) -> Any:
         count = NumberOfEntities(
-            len(entities.subscriptions),
-            len(entities.guards) + 2,
-            len(entities.timers),
-            len(entities.clients),
-            len(entities.services),
+            len(streams.subscriptions),
+            len(streams.guards) + 2,
+            len(streams.timers),
+            len(seldom.clients),
+            len(seldom.services),
         )
-        for waitable in entities.waitables:
+        for waitable in seldom.waitables:
             count += waitable.get_num_entities()
         return _rclpy.WaitSet(
             count.num_subscriptions,
@@ -102,29 +117,41 @@ class StreamExecutor(Executor):
             self._context.handle,
         )
 
-    def _wait(self, entities: _Entities, timeout_ns: int) -> set[int]:
-        """Wait, run what waitables have to do, and return the handles of the other entities that are ready."""
+    def _wait(self, streams: _Streams, seldom: _Seldom | None, end: float) -> set[int]:
+        """Wait until a time [s], and return the handles of the streams that are ready."""
         wait_set = self._wait_set
         wait_set.clear_entities()
-        for subscription in entities.subscriptions:
+        for subscription in streams.subscriptions:
             wait_set.add_subscription(subscription.handle)
-        for timer in entities.timers:
+        for timer in streams.timers:
             wait_set.add_timer(timer.handle)
-        for client in entities.clients:
-            wait_set.add_client(client.handle)
-        for service in entities.services:
-            wait_set.add_service(service.handle)
-        for guard in (*entities.guards, self._guard, self._sigint_gc):
+        for guard in (*streams.guards, self._guard, self._sigint_gc):
             wait_set.add_guard_condition(guard.handle)
-        for waitable in entities.waitables:
-            waitable.add_to_wait_set(wait_set)
-        wait_set.wait(timeout_ns)
+        if seldom:
+            for client in seldom.clients:
+                wait_set.add_client(client.handle)
+            for service in seldom.services:
+                wait_set.add_service(service.handle)
+            for waitable in seldom.waitables:
+                waitable.add_to_wait_set(wait_set)
+        wait_set.wait(timeout_sec_to_nsec(None if math.isinf(end) else max(end - time.monotonic(), 0.0)))
         if not self._context.ok():
             raise ExternalShutdownException
-        for waitable in [one for one in entities.waitables if one.is_ready(wait_set)]:
+        return {pointer for kind in _STREAM_KINDS for pointer in wait_set.get_ready_entities(kind)}
+
+    def _see_to(self, seldom: _Seldom) -> None:
+        """Run what services, clients and waitables have to do after the last wait."""
+        wait_set = self._wait_set
+        for waitable in [one for one in seldom.waitables if one.is_ready(wait_set)]:
             self._handle(waitable, self._take_waitable)
-        kinds = ('subscription', 'timer', 'service', 'client', 'guard_condition')
-        return {pointer for kind in kinds for pointer in wait_set.get_ready_entities(kind)}
+        for entities, kind, take in (
+            (seldom.services, 'service', self._take_service),
+            (seldom.clients, 'client', self._take_client),
+        ):
+            asked = set(wait_set.get_ready_entities(kind))
+            for entity in entities:
+                if entity.handle.pointer in asked:
+                    self._handle(entity, take)
 
     def _read(self, subscription: Any) -> None:
         """Take what waits in a subscription, for at most TURN_SECONDS."""

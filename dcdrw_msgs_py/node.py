@@ -146,22 +146,51 @@ def message_type(topic: Topic) -> Any:
     return getattr(import_module(f'{package}.{kind}'), name)
 
 
-_handed_over: dict[str, list[Callable[[Any], None]]] | None = None
-"""Where several nodes share this process: each topic that one of them publishes, and who of the others listens."""
+_outlets: dict[str, list['Outlet']] | None = None
+"""Where several nodes share this process: who of them publishes a stream, by its full name."""
 
 
 class Outlet:
-    """A publisher that hands its messages to the nodes of this process, and to DDS while somebody else listens."""
+    """A publisher that costs next to nothing while nobody listens.
 
-    def __init__(self, publisher: Any, listeners: list[Callable[[Any], None]]) -> None:
-        self._publisher, self._listeners = publisher, listeners
+    In a shared process it hands what it publishes directly to the other nodes that listen.
+    """
+
+    def __init__(self, publisher: Any, latched: bool) -> None:
+        self._publisher, self._latched = publisher, latched
+        self._by_message: list[Callable[[Any], None]] = []
+        self._by_sample: list[Callable[[Any], None]] = []
+        self._last: Any = None
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether anybody listens, or will hear it later, so that a message is worth being made."""
+        return bool(self._latched or self._by_message or self._publisher.get_subscription_count())
+
+    def hand_to(self, callback: Callable[[Any], None], take_sample: Callable[[Any], None] | None) -> None:
+        """Hand over from now on, of a latched topic the last message at once; arguments as of `listen`."""
+        if take_sample:
+            self._by_sample.append(take_sample)
+            return
+        self._by_message.append(callback)
+        if self._last is not None:
+            callback(self._last)
 
     def publish(self, message: Any) -> None:
-        """Publish a message."""
-        if self._publisher.get_subscription_count():
+        """Publish a message to all who listen now; a listener of this process must not keep it."""
+        if self._latched:
+            self._last = message
+        if self._latched or self._publisher.get_subscription_count():
             self._publisher.publish(message)
-        for listener in self._listeners:
-            listener(message)
+        for callback in self._by_message:
+            callback(message)
+
+    def publish_sample(self, sample: Any, write: Callable[[Any], Any]) -> None:
+        """Publish a sample, as a message that `write` makes of it where somebody needs one."""
+        if self.is_heard:
+            self.publish(write(sample))
+        for take_sample in self._by_sample:
+            take_sample(sample)
 
     def __getattr__(self, name: str) -> Any:
         """All else is the publisher's."""
@@ -169,18 +198,29 @@ class Outlet:
 
 
 def share_process() -> None:
-    """From now on, nodes made in this process hand samples to those made after them directly, without DDS."""
-    global _handed_over
-    _handed_over = {}
+    """From now on, nodes made in this process hand streams to those made after them directly, without DDS."""
+    global _outlets
+    _outlets = {}
 
 
-def advertise(node: Node, topic: Topic) -> Any:
-    """Publish a topic: reliably, and latched where it is declared so."""
+def advertise(node: Node, topic: Topic, from_threads: bool = False) -> Any:
+    """Publish a topic: reliably, and latched where it is declared so.
+
+    Args:
+        node: the node.
+        topic: the topic.
+        from_threads: whether other threads than the executor's publish it, so that it takes the way by DDS even to a
+            node of the same process.
+
+    """
     durability = DurabilityPolicy.TRANSIENT_LOCAL if topic.latched else DurabilityPolicy.VOLATILE
     qos = QoSProfile(depth=topic.depth, reliability=ReliabilityPolicy.RELIABLE, durability=durability)
     if topic.latched:  # what is kept outlives whoever said it: let consumers ask whether that node still lives
         qos.liveliness_lease_duration = Duration(seconds=LEASE_SECONDS)
-    return node.create_publisher(message_type(topic), topic.name, qos)
+    outlet = Outlet(node.create_publisher(message_type(topic), topic.name, qos), topic.latched)
+    if _outlets is not None and (topic.latched or topic.depth == SAMPLE_DEPTH) and not from_threads:
+        _outlets.setdefault(outlet.topic_name, []).append(outlet)
+    return outlet
 
 
 class Inbox:
@@ -219,21 +259,37 @@ class Inbox:
             self._passed_at = time.monotonic()
 
 
-def listen(node: Node, topic: Topic, callback: Callable[[Any], None], depth: int = SAMPLE_DEPTH) -> Any:
+def listen(
+    node: Node,
+    topic: Topic,
+    callback: Callable[[Any], None],
+    depth: int = SAMPLE_DEPTH,
+    take_sample: Callable[[Any], None] | None = None,
+) -> Any:
     """Subscribe so that reliable and best-effort publishers both match; to a latched topic, as it is published.
 
     Where the node cannot keep up, an `Inbox` drops what is old; `report` tells of it. In a shared process, what another
     node of it publishes is handed over, and heard from nobody else; there is no subscription then.
+
+    Args:
+        node: the node.
+        topic: the topic.
+        callback: is called with each message.
+        depth: so many messages wait at least.
+        take_sample: is called in its place with the sample itself, where another node of this process hands samples
+            over (`Outlet.publish_sample`).
+
     """
+    outlets = _outlets.get(node.resolve_topic_name(topic.name)) if _outlets else None
+    if outlets:
+        for outlet in outlets:
+            outlet.hand_to(callback, take_sample)
+        return None
     if topic.latched:
         qos = QoSProfile(
             depth=topic.depth, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
         )
         return node.create_subscription(message_type(topic), topic.name, callback, qos)
-    name = node.resolve_topic_name(topic.name)
-    if _handed_over is not None and name in _handed_over:
-        _handed_over[name].append(callback)
-        return None
     qos = QoSProfile(depth=max(topic.depth, depth), reliability=ReliabilityPolicy.BEST_EFFORT)
     return node.create_subscription(message_type(topic), topic.name, Inbox(callback).__call__, qos)
 

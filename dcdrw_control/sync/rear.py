@@ -47,8 +47,8 @@ class HubGains(NamedTuple):
         """
         if len(self.free_speeds) < 3 or min(self.free_speeds) <= 0.0 or not self.inertia > 0.0:
             raise ValueError(
-                'hub.free_speeds must be at least three speeds above 0, and hub.inertia above 0: dcdrw.suite.hub_gains '
-                'computes them for a rig'
+                'hub.free_speeds must be at least three speeds above 0, and hub.inertia above 0: let `dcdrw control '
+                '--law rear --rig RIG.yaml --out gains.yaml` compute them, and give --params-file gains.yaml'
             )
 
 

@@ -34,6 +34,8 @@ MOST_GAIN = 20.0
 """Where the search for an unstable gain ends, in gains of the law."""
 EDGE_SAMPLES = 40
 """Gains or delays that are tried along the way; between two of them the edge is found exactly."""
+EDGE = 1e-4
+"""To so much of the range of the search."""
 WHOLE_STEP = 0.999
 """Delays are looked at up to this fraction of a step's time; a longer one would be that of another step."""
 
@@ -140,18 +142,29 @@ def margins(plant: Plant, chosen: Law) -> Margins:
         return float(abs(_with_delay(plant.rig, plant.point, plant.force, delay).closed(chosen)[0])) - 1.0
 
     return Margins(
-        _first_unstable(radius_of_gain, 1.0, MOST_GAIN),
-        _first_unstable(radius_of_delay, plant.delay, WHOLE_STEP * plant.point.period),
+        first_unstable(radius_of_gain, 1.0, MOST_GAIN),
+        first_unstable(radius_of_delay, plant.delay, WHOLE_STEP * plant.point.period),
     )
 
 
-def _first_unstable(radius: Callable[[float], float], low: float, high: float) -> float:
-    grid = np.linspace(low, high, EDGE_SAMPLES)
-    values = [radius(value) for value in grid]
-    for i in range(1, len(grid)):
-        if values[i - 1] < 0.0 <= values[i]:
-            return float(brentq(radius, grid[i - 1], grid[i]))
-    return low if values[0] >= 0.0 else math.inf
+def first_unstable(growth: Callable[[float], float], low: float, high: float, samples: int = EDGE_SAMPLES) -> float:
+    """The least value at which a loop is unstable; infinite where none is found.
+
+    Args:
+        growth: negative where the loop is stable at a value.
+        low: where the search begins.
+        high: where it ends.
+        samples: how many values are tried; between two of them the edge is found exactly.
+
+    """
+    before, stable = low, growth(low)
+    if stable >= 0.0:
+        return low
+    for value in np.linspace(low, high, samples)[1:]:
+        if growth(value) >= 0.0:
+            return float(brentq(growth, before, value, xtol=EDGE * (high - low)))
+        before = value
+    return math.inf
 
 
 def _target(rig: RigParams, target: Target, limit: float) -> tuple[FixedPoint, float]:

@@ -68,9 +68,9 @@ class TagTrackerNode(Node):
         # Not 1: a tracker that was started anew must not seem to go on with the run of the one before.
         self._run = first_run = time.time_ns() // SECOND
         self._announced = 0
-        self._runs = advertise(self, RUNS)
-        self._joint_states = advertise(self, JOINT_STATES)
-        self._detections = advertise(self, TAG_DETECTIONS)
+        self._runs = advertise(self, RUNS, from_threads=True)
+        self._joint_states = advertise(self, JOINT_STATES, from_threads=True)
+        self._detections = advertise(self, TAG_DETECTIONS, from_threads=True)
         self._debug_image = advertise(self, DEBUG_IMAGE)
         self._writer = JointSampleWriter()
         self._age = Age()
@@ -193,7 +193,7 @@ class TagTrackerNode(Node):
         for one in tracked.detections:
             wheel = self._tracker.mounts[one.id].wheel
             self._detections.publish(tag_message(wheel, one.id, one.corners, picture.stamp_ns, frame_id))
-        if self._debug_image.get_subscription_count():
+        if self._debug_image.is_heard:
             self._debug_image.publish(image_message(self._drawn(picture, tracked, self._through), frame_id))
 
     def _drawn(self, picture: Frame, tracked: Tracked, through: Camera) -> Frame:

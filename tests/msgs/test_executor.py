@@ -8,14 +8,14 @@ from itertools import pairwise
 import pytest
 import rclpy
 from rclpy.context import Context
-from std_msgs.msg import Float64
+from std_msgs.msg import Bool, Float64
 from std_srvs.srv import Trigger
 
 from dcdrw.suite.processes import free_domain
 from dcdrw_msgs_py import node as nodes
 from dcdrw_msgs_py.executor import StreamExecutor
-from dcdrw_msgs_py.node import FRESH, OLD, Inbox, dropped, listen, steady_clock
-from dcdrw_msgs_py.topics import PHI
+from dcdrw_msgs_py.node import FRESH, OLD, Inbox, advertise, dropped, listen, share_process, steady_clock
+from dcdrw_msgs_py.topics import DIAGNOSTICS, PHI, SYNCHRONIZED
 
 pytestmark = pytest.mark.processes
 PATIENCE = 60.0
@@ -97,6 +97,47 @@ def test_an_exception_of_a_callback_comes_out_of_the_executor(pair):
     pair.hearer.create_timer(0.001, fail, clock=steady_clock())
     with pytest.raises(KeyError, match='ours'):
         pair.until(lambda: False, 'the exception')
+
+
+@pytest.fixture
+def shared(pair, monkeypatch) -> Pair:
+    monkeypatch.setattr(nodes, '_outlets', None)
+    share_process()
+    return pair
+
+
+def test_in_a_shared_process_streams_are_handed_over_and_others_hear_them_over_dds(shared):
+    outlet = advertise(shared.speaker, PHI)
+    handed: list[float] = []
+    samples: list[float] = []
+    listen(shared.hearer, PHI, lambda message: None, take_sample=samples.append)
+    assert not outlet.is_heard  # nobody needs a message
+    outlet.publish_sample(1.0, lambda sample: pytest.fail('a message was made for nobody'))
+    listen(shared.hearer, PHI, lambda message: handed.append(message.data))
+    outlet.publish_sample(2.0, lambda sample: Float64(data=sample))
+    assert (samples, handed) == ([1.0, 2.0], [2.0])
+    assert outlet.get_subscription_count() == 0
+    outside: list[float] = []
+    shared.hearer.create_subscription(Float64, 'phi', lambda message: outside.append(message.data), 10)
+    shared.until(outlet.get_subscription_count, 'the subscription')
+    outlet.publish_sample(3.0, lambda sample: Float64(data=sample))
+    shared.until(lambda: outside == [3.0], 'the message')
+    assert handed == [2.0, 3.0]
+
+
+def test_in_a_shared_process_what_is_latched_is_heard_by_whoever_comes_later(shared):
+    outlet = advertise(shared.speaker, SYNCHRONIZED)
+    outlet.publish(Bool(data=True))
+    handed: list[bool] = []
+    listen(shared.hearer, SYNCHRONIZED, lambda message: handed.append(message.data))
+    assert handed == [True]
+
+
+def test_what_many_publish_or_what_threads_publish_goes_over_dds_in_a_shared_process_too(shared):
+    advertise(shared.speaker, DIAGNOSTICS)
+    advertise(shared.speaker, PHI, from_threads=True)
+    assert listen(shared.hearer, DIAGNOSTICS, lambda message: None) is not None
+    assert listen(shared.hearer, PHI, lambda message: None) is not None
 
 
 class Clock:

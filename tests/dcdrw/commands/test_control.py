@@ -10,16 +10,17 @@ from dcdrw_msgs_py.quantity import build
 from dcdrw_msgs_py.yaml_file import read_yaml
 
 
-def test_its_gains_are_the_nodes_parameters(tmp_path, capsys):
+@pytest.mark.parametrize('law', ['hold', 'rear'])
+def test_its_gains_are_the_nodes_parameters(tmp_path, capsys, law):
     out = tmp_path / 'gains.yaml'
-    assert main(['control', '--out', str(out)]) == 0
+    assert main(['control', '--law', law, '--k', '16', '--b', '10', '--out', str(out)]) == 0
     told = capsys.readouterr().out
     assert 'multipliers' in told
     assert 'unstable' in told
     given = read_yaml(out)['/**']['ros__parameters']
     params = build(SynchronizerParams, {name: tuple(v) if isinstance(v, list) else v for name, v in given.items()})
     params.check_law()
-    assert params.law == 'hold'
+    assert params.law == law
     assert main(['control', '--out', str(out)]) == 2  # it exists
     assert main(['control', '--out', str(out), '--force']) == 0
 
