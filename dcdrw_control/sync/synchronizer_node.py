@@ -1,0 +1,125 @@
+"""The node `synchronizer`: phase in; a bounded force or torque out, while somebody enables it."""
+
+import math
+import sys
+import time
+from typing import Any
+
+from geometry_msgs.msg import WrenchStamped
+from rclpy.node import Node
+from std_msgs.msg import Float64, String
+from std_srvs.srv import Trigger
+
+from dcdrw_control.sync.diagnosis import diagnose_synchronizer
+from dcdrw_control.sync.safety import State
+from dcdrw_control.sync.synchronizer import Command, Synchronizer, SynchronizerParams
+from dcdrw_msgs_py.diagnosis import Diagnosis
+from dcdrw_msgs_py.messages import PhaseSampleReader, to_stamp
+from dcdrw_msgs_py.node import Parameters, advertise, listen, publish_diagnosis, run, steady_clock
+from dcdrw_msgs_py.samples import PhaseSample
+from dcdrw_msgs_py.topics import (
+    COUPLER_FORCE_COMMAND,
+    COUPLER_WRENCH,
+    ENABLE,
+    PHASE_STATE,
+    REAR_TORQUE_COMMAND,
+    SYNCHRONIZER_STATE,
+)
+
+WATCH_SECONDS = 0.1
+"""How often other publishers and the clock are looked at [s]."""
+
+
+class SynchronizerNode(Node):
+    """Converts messages for the `Synchronizer`, and asks it for a command at a fixed rate."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('synchronizer', **kwargs)
+        settings = Parameters(self, SynchronizerParams, self._configure, SynchronizerParams.check_law)
+        self._core = Synchronizer(settings.value)
+        self._reader = PhaseSampleReader()
+        self._told: State | None = None
+        self._command = Command(0.0, 0.0, State.DISABLED, 0)
+        self._last_clock = 0
+        self._effort = advertise(self, REAR_TORQUE_COMMAND if self._core.drives_hub else COUPLER_FORCE_COMMAND)
+        self._wrench = advertise(self, COUPLER_WRENCH)
+        self._state = advertise(self, SYNCHRONIZER_STATE)
+        self.create_service(Trigger, '~/stop', self._on_stop)
+        self.create_service(Trigger, '~/reset_fault', self._on_reset_fault)
+        listen(self, ENABLE, lambda message: self._core.enable(time.monotonic(), message.data))
+        listen(self, PHASE_STATE, self._on_message, take_sample=self._on_phase)
+        publish_diagnosis(self, self._diagnose)
+        self.create_timer(1.0 / settings.value.rate, self._tick, clock=steady_clock())
+        self.create_timer(WATCH_SECONDS, self._watch, clock=steady_clock())
+        self._tick()
+
+    def say_last_words(self) -> None:
+        """Leave no force behind."""
+        self._core.safety.stop()
+        self._publish(Command(0.0, 0.0, State.DISABLED, self._command.stamp_ns))
+
+    def _configure(self, params: SynchronizerParams) -> None:
+        self._core.configure(params)
+
+    def _on_message(self, message: Any) -> None:
+        try:
+            sample = self._reader.read(message)
+        except ValueError as error:
+            self._core.refuse()
+            self.get_logger().warning(f'phase_state: {error}', throttle_duration_sec=1.0)
+            return
+        self._on_phase(sample)
+
+    def _on_phase(self, sample: PhaseSample) -> None:
+        self._core.update(sample, time.monotonic())
+
+    def _tick(self) -> None:
+        self._publish(self._core.command(time.monotonic()))
+
+    def _publish(self, command: Command) -> None:
+        self._command = command
+        self._effort.publish(Float64(data=command.torque if self._core.drives_hub else command.force))
+        if self._wrench.is_heard:
+            wrench = WrenchStamped()
+            wrench.header.stamp = to_stamp(command.stamp_ns)
+            wrench.wrench.force.x, wrench.wrench.torque.y = command.force, command.torque
+            self._wrench.publish(wrench)
+        if command.state is not self._told:
+            self._told = command.state
+            self._state.publish(String(data=command.state.value))
+            reason = self._core.safety.reason
+            self.get_logger().info(command.state.value + (f': {reason}' if reason else ''))
+
+    def _watch(self) -> None:
+        """See what no sample tells."""
+        if self.count_publishers(self._effort.topic_name) > 1:
+            self._core.conflict('second publisher')
+        now = self.get_clock().now().nanoseconds
+        if now < self._last_clock:
+            self._core.conflict('clock')
+        self._last_clock = now
+
+    def _on_stop(self, request: Any, response: Any) -> Any:
+        self._core.safety.stop()
+        response.success, response.message = True, 'stopped; release enable, then renew it to go on'
+        return response
+
+    def _on_reset_fault(self, request: Any, response: Any) -> Any:
+        response.success = self._core.safety.reset_fault()
+        response.message = 'release enable, then renew it to go on' if response.success else 'there is no fault'
+        return response
+
+    def _diagnose(self) -> Diagnosis:
+        now_ns = self.get_clock().now().nanoseconds
+        stamp = self._command.stamp_ns
+        age = (now_ns - stamp) * 1e-9 if stamp else math.nan
+        return diagnose_synchronizer(self._core, self._command, age)
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node."""
+    return run('synchronizer', SynchronizerNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -2,7 +2,10 @@
 
 import math
 
+import hypothesis.strategies as st
 import pytest
+from hypothesis import settings
+from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
 
 from dcdrw_control.sync.hold import HoldGains
 from dcdrw_control.sync.safety import State
@@ -20,6 +23,7 @@ from dcdrw_sim.motion.trajectory import run
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams
 
 PAPER = preset('paper')
+ALPHA = PAPER.front.alpha
 RATE = 500.0
 
 
@@ -131,6 +135,112 @@ def test_a_heartbeat_that_ends_ramps_the_force_down():
     assert forces == sorted(forces, reverse=True)
     assert forces[-11] == 0.0  # after 100 ms
     assert core.safety.state is State.DISABLED
+
+
+class Anything(RuleBasedStateMachine):
+    """Whatever is heard, in whatever order: a force needs a fresh heartbeat and a fresh, sound input, or is gone."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.core = Synchronizer(HOLD)
+        self.now, self.stamp_ns, self.turned, self.restarts = 1.0, 1_000_000_000, 0.0, 0
+        self.heartbeat = self.heard = self.allowed = -math.inf
+        self.may_push = True
+        """Nothing has stopped it since the heartbeat was last seen to be absent."""
+
+    def ask(self) -> None:
+        """A command, held against what was heard."""
+        command, params = self.core.command(self.now), HOLD
+        enabled = self.now - self.heartbeat <= params.enable_timeout
+        fresh = self.now - self.heard <= params.stale_after
+        if not enabled and self.core.safety.state is not State.FAULT:
+            self.may_push = True
+        if enabled and fresh and self.may_push:
+            self.allowed = self.now
+        assert abs(command.force) <= params.limits.max_force
+        if command.force:
+            assert command.state in (State.ACTIVE, State.RAMP_DOWN)
+            assert fresh
+            assert self.now - self.allowed <= 0.1
+        if command.state is State.ACTIVE:
+            assert self.may_push
+
+    def sample(self, **change) -> None:
+        self.stamp_ns += 5_000_000
+        front, rear = (
+            Turn((self.turned + ahead * 2.0 * ALPHA) % (2.0 * ALPHA) - ALPHA, 1.1) for ahead in (0.0, self.lead)
+        )
+        sample = PhaseSample(self.stamp_ns, front, rear, Turn(), 0, self.restarts)._replace(**change)
+        self.core.update(sample, self.now)
+
+    @initialize(lead=st.floats(0.05, 0.95))
+    def begin(self, lead):
+        self.lead = lead
+
+    @rule(samples=st.integers(1, 200), enabled=st.booleans())
+    def walk(self, samples, enabled):
+        for _ in range(samples):
+            self.now += 0.005
+            self.turned += 1.1 * 0.005
+            self.sample()
+            self.heard = self.now
+            self.core.enable(self.now, enabled)
+            self.heartbeat = self.now if enabled else -math.inf
+            self.ask()
+
+    @rule(ticks=st.integers(1, 60), dt=st.floats(0.001, 0.02), enabled=st.booleans())
+    def hear_nothing(self, ticks, dt, enabled):
+        for _ in range(ticks):
+            self.now += dt
+            if enabled:
+                self.core.enable(self.now, True)
+                self.heartbeat = self.now
+            self.ask()
+
+    @rule(
+        change=st.sampled_from(
+            [
+                {'front': Turn(math.nan, 1.0)},
+                {'rear': Turn(0.1, -math.inf)},
+                {'step_difference': -2},
+                {'stamp_ns': 7},
+                'new run',
+                'no sample',
+                'clock',
+                'second publisher',
+                'stop',
+            ]
+        )
+    )
+    def spoil(self, change):
+        pushes = self.core.safety.state in (State.ACTIVE, State.RAMP_DOWN)
+        if change == 'stop':
+            self.core.safety.stop()
+            self.may_push = False
+            return
+        if change == 'no sample':
+            self.core.refuse()
+        elif change in ('clock', 'second publisher'):
+            self.core.conflict(change)
+        elif change == 'new run':
+            self.restarts += 1
+            self.sample()
+        else:
+            self.sample(**change)
+            if 'stamp_ns' in change:
+                self.stamp_ns = 7
+        if pushes:
+            self.may_push = False
+            assert self.core.safety.state is State.FAULT
+            assert self.core.command(self.now).force == 0.0
+
+    @rule()
+    def reset(self):
+        self.core.safety.reset_fault()
+
+
+TestAnything = Anything.TestCase
+TestAnything.settings = settings(deadline=None, max_examples=60, stateful_step_count=25)
 
 
 def test_hold_without_gains_is_refused_with_the_mend():

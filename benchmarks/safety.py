@@ -1,0 +1,297 @@
+"""Whatever dies while the synchronizer pushes: how soon no force is left on the pair, trial by trial.
+
+    python benchmarks/safety.py [--trials 100] [--kinds simulator phase_estimator synchronizer nan heartbeat]
+
+Simulator, estimator and synchronizer run as processes, in real time at 1 kHz. In each trial the pair starts at 10 %,
+and once the synchronizer pushes with more than 1 N one of them is killed (SIGKILL), or a `phase_state` with NaN or
+without a wheel is sent, or the heartbeat is released: by false, or by silence, which counts from its expiry. Measured
+until the command is 0 N and stays so; where the synchronizer itself is killed, until the force that acts on the
+simulated pair is. All times are those of arrival here. A trial passes if that takes at most 100 ms, and no command was
+ever beyond the limit. One stack serves all trials; only what was killed is started again.
+
+The machine must have time for them: on a busy one, start this by `nice -n -10`.
+"""
+
+import argparse
+import contextlib
+import importlib
+import math
+import multiprocessing
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from multiprocessing.context import ForkServerProcess
+from typing import Any, NamedTuple
+
+import numpy as np
+import rclpy
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+
+from dcdrw.suite.executables import PHASE_ESTIMATOR, SIMULATOR, SYNCHRONIZER, Executable
+from dcdrw.suite.processes import free_domain
+from dcdrw_control.sync.safety import Limits, State
+from dcdrw_control.sync.synchronizer import SynchronizerParams
+from dcdrw_msgs_py.executor import StreamExecutor
+from dcdrw_msgs_py.messages import JointSampleReader, PhaseSampleWriter
+from dcdrw_msgs_py.node import advertise, listen, steady_clock
+from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.samples import JointSample, PhaseSample, Turn
+from dcdrw_msgs_py.topics import (
+    COUPLER_FORCE_COMMAND,
+    ENABLE,
+    FRONT_STANCE,
+    JOINT_STATES,
+    PHASE_STATE,
+    SYNCHRONIZER_STATE,
+)
+from dcdrw_sim.map.holding import law, plant
+from dcdrw_sim.model.dynamics import coupler_force
+
+NODES = (SYNCHRONIZER, PHASE_ESTIMATOR, SIMULATOR)
+KILLED = tuple(node.name for node in reversed(NODES))
+KINDS = (*KILLED, 'nan', 'heartbeat')
+WITHIN = 0.1
+"""After this there must be no force [s]."""
+WATCHED = 0.4
+"""How long a trial is watched after the event [s]."""
+PUSH = 1.0
+"""A force beyond this is on [N]."""
+NOTHING = 1e-6
+"""A force within this is none: told from spring and damper no better than so [N]."""
+HEARTBEAT = 0.02
+"""[s]"""
+PATIENCE = 60.0
+"""Limit of every wait [s]."""
+
+
+def run_node(module: str, arguments: list[str]) -> None:
+    """A node's own program."""
+    sys.exit(importlib.import_module(module).main(arguments))
+
+
+class Stack:
+    """Simulator, estimator and synchronizer as processes, and what is heard of them here."""
+
+    def __init__(self, rig: RigParams, **simulator: Any) -> None:
+        chosen = law(plant(rig))
+        self.rig = rig.resolved()
+        self._parameters: dict[str, dict[str, Any]] = {
+            SIMULATOR.name: simulator,
+            PHASE_ESTIMATOR.name: {},
+            SYNCHRONIZER.name: {
+                'law': 'hold',
+                'hold.state': [float(value) for value in chosen.state],
+                'hold.gain': [float(value) for value in chosen.gain],
+            },
+        }
+        # A server that has imported everything forks each node, so that one is there in a fraction of a second.
+        self._processes = multiprocessing.get_context('forkserver')
+        self._processes.set_forkserver_preload([node.module for node in NODES])
+        self._running: dict[str, ForkServerProcess] = {}
+        self._node = rclpy.create_node('safety')
+        self._reader = JointSampleReader()
+        self.joints: list[tuple[float, JointSample]] = []
+        """When they came [s], and what."""
+        self.commands: list[tuple[float, float]] = []
+        """When they came [s], and what [N]."""
+        self.state = ''
+        self.enabled = False
+        listen(self._node, JOINT_STATES, lambda one: self.joints.append((time.monotonic(), self._reader.read(one))))
+        listen(self._node, COUPLER_FORCE_COMMAND, lambda one: self.commands.append((time.monotonic(), one.data)))
+        listen(self._node, SYNCHRONIZER_STATE, self._on_state)
+        self.phases = advertise(self._node, PHASE_STATE)
+        self._enable = advertise(self._node, ENABLE)
+        self.last_heartbeat = -math.inf
+        self._node.create_timer(HEARTBEAT, self._beat, clock=steady_clock())
+        self._executor = StreamExecutor()
+        self._executor.add_node(self._node)
+        for node in NODES:
+            self.start(node)
+
+    def start(self, node: Executable) -> None:
+        """Start a node that does not run."""
+        arguments = ['--ros-args', '--log-level', 'fatal']
+        for name, value in self._parameters[node.name].items():
+            arguments += ['-p', f'{name}:={value}']
+        process = self._processes.Process(target=run_node, args=(node.module, arguments), daemon=True)
+        process.start()
+        self._running[node.name] = process
+
+    def kill(self, name: str) -> None:
+        """SIGKILL, without a warning."""
+        self._running[name].kill()
+
+    def revive(self) -> None:
+        """Start again what was killed."""
+        for node in NODES:
+            if not self._running[node.name].is_alive():
+                self._running[node.name].join()
+                self.start(node)
+
+    def close(self) -> None:
+        """End all."""
+        for process in self._running.values():
+            process.kill()
+            process.join()
+        self._executor.shutdown()
+        self._node.destroy_node()
+
+    def set(self, simulator: dict[str, Any]) -> None:
+        """Other parameters for a simulator that is started from now on."""
+        self._parameters[SIMULATOR.name] |= simulator
+
+    def call(self, name: str, kind: Any = Trigger, **request: Any) -> None:
+        """Call a service until it answers."""
+        client = self._node.create_client(kind, name)
+        self.wait(client.service_is_ready, f'the service {name}')
+        answer = client.call_async(kind.Request(**request))
+        with contextlib.suppress(TimeoutError):  # a server may find its client late: its answer is lost then
+            self.wait(answer.done, f'an answer of {name}', 3.0)
+        self._node.destroy_client(client)
+
+    def beat(self, on: bool) -> None:
+        """Send a heartbeat now."""
+        self._enable.publish(Bool(data=on))
+
+    def wait(self, condition: Callable[[], Any], what: str, limit: float = PATIENCE) -> None:
+        """Listen until a condition holds.
+
+        Raises:
+            TimeoutError: it does not.
+
+        """
+        end = time.monotonic() + limit
+        while not condition():
+            if time.monotonic() > end:
+                raise TimeoutError(f'{what} did not come within {limit:g} s')
+            self._executor.spin_once(timeout_sec=0.01)
+
+    def listen(self, seconds: float) -> None:
+        """Listen for a while."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0.0:
+            self._executor.spin_once(timeout_sec=left)
+
+    def external_force(self, sample: JointSample) -> float:
+        """What acts on the pair beside spring and damper [N]."""
+        length, rate, force = sample.coupler
+        return force - float(coupler_force(self.rig, length, rate))
+
+    def rest(self) -> None:
+        """Let go of the pair, forget a fault, and see that all nodes run."""
+        self.enabled = False
+        self.revive()
+        self.wait(self._rests, 'a synchronizer at rest')
+        if self.state == State.FAULT.value:
+            self.call('synchronizer/reset_fault')
+            self.wait(lambda: self.state == State.DISABLED.value, 'the end of the fault')
+
+    def push(self) -> None:
+        """From a fresh start, let the synchronizer push."""
+        self.rest()
+        self.call('simulator/reset')
+        self.joints.clear()
+        self.commands.clear()
+        self.wait(lambda: self.joints and self.commands, 'joint states and commands')
+        self.enabled = True
+        self.wait(lambda: self.is_pushing or self.state == State.FAULT.value, 'a force')
+
+    def _rests(self) -> bool:
+        self.beat(False)
+        return self.state in (State.DISABLED.value, State.FAULT.value)
+
+    @property
+    def is_pushing(self) -> bool:
+        """Whether a force acts, by the command and on the pair."""
+        return (
+            self.state == State.ACTIVE.value
+            and abs(self.commands[-1][1]) > PUSH
+            and abs(self.external_force(self.joints[-1][1])) > PUSH
+        )
+
+    def _on_state(self, message: Any) -> None:
+        self.state = message.data
+
+    def _beat(self) -> None:
+        if self.enabled:
+            self.beat(True)
+            self.last_heartbeat = time.monotonic()
+
+
+@contextlib.contextmanager
+def stack_of(rig: RigParams, **simulator: Any) -> Iterator[Stack]:
+    """A stack on a domain of its own."""
+    with free_domain() as domain:
+        # Over UDP, for who is killed leaves locks in shared memory.
+        os.environ.update(
+            ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST', FASTDDS_BUILTIN_TRANSPORTS='UDPv4'
+        )
+        rclpy.init()
+        stack = Stack(rig, **simulator)
+        try:
+            yield stack
+        finally:
+            stack.close()
+            rclpy.shutdown()
+
+
+class Trial(NamedTuple):
+    """What one trial came to."""
+
+    seconds: float
+    """From the event until there was no force [s]; infinite where one was left."""
+    largest: float
+    """Command [N]."""
+
+
+def trial(stack: Stack, kind: str, number: int) -> Trial:
+    """Let the synchronizer push, and take something away."""
+    stack.push()
+    while not stack.is_pushing:  # on a busy machine a stall may be a fault
+        stack.push()
+    event = time.monotonic()
+    if kind in KILLED:
+        stack.kill(kind)
+    elif kind == 'nan' and number % 2:
+        stack.phases.publish(JointState(name=[FRONT_STANCE], position=[0.0]))
+    elif kind == 'nan':
+        stack.phases.publish(PhaseSampleWriter().write(PhaseSample(0, Turn(), Turn(), Turn(), 0)))
+    elif number % 2:
+        stack.enabled = False
+        stack.beat(False)
+    else:
+        stack.enabled = False
+        event = stack.last_heartbeat + SynchronizerParams().enable_timeout
+    stack.listen(WATCHED + max(event - time.monotonic(), 0.0))
+    if kind == SYNCHRONIZER.name:
+        forces = [(when - event, stack.external_force(sample)) for when, sample in stack.joints]
+    else:
+        forces = [(when - event, force) for when, force in stack.commands]
+    off = forces[-1][0] > WITHIN and abs(forces[-1][1]) <= NOTHING
+    last_on = max(when for when, force in forces if abs(force) > NOTHING)
+    return Trial(max(last_on, 0.0) if off else math.inf, max(abs(force) for _, force in stack.commands))
+
+
+def main() -> int:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else '')
+    parser.add_argument('--trials', type=int, default=100, help='of each kind')
+    parser.add_argument('--kinds', nargs='+', choices=KINDS, default=KINDS, help='what is taken away')
+    options = parser.parse_args()
+    with stack_of(RigParams(), initial_phase_percent=10.0) as stack:
+        print(f'{"taken away":18} {"passed":>10} {"median ms":>10} {"worst ms":>9} {"largest N":>10}')
+        for kind in options.kinds:
+            found = [trial(stack, kind, number) for number in range(options.trials)]
+            passed = sum(one.seconds <= WITHIN and one.largest <= Limits().max_force for one in found)
+            seconds = [one.seconds for one in found]
+            times = f'{1e3 * np.median(seconds):10.1f} {1e3 * max(seconds):9.1f}'
+            largest = max(one.largest for one in found)
+            print(f'{kind:18} {passed:3} of {len(found):3} {times} {largest:10.2f}', flush=True)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
