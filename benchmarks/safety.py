@@ -4,10 +4,10 @@
 
 Simulator, estimator and synchronizer run as processes, in real time at 1 kHz. In each trial the pair starts at 10 %,
 and once the synchronizer pushes with more than 1 N one of them is killed (SIGKILL), or a `phase_state` with NaN or
-without a wheel is sent, or the heartbeat is released: by false, or by silence, which counts from its expiry. Measured
-until the command is 0 N and stays so; where the synchronizer itself is killed, until the force that acts on the
-simulated pair is. All times are those of arrival here. A trial passes if that takes at most 100 ms, and no command was
-ever beyond the limit. One stack serves all trials; only what was killed is started again.
+without a wheel is sent every 5 ms, or the heartbeat is released: by false, or by silence, which counts from its expiry.
+Measured until the command is 0 N and stays so; where the synchronizer itself is killed, until the force that acts on
+the simulated pair is. All times are those of arrival here. A trial passes if that takes at most 100 ms, and no command
+was ever beyond the limit. One stack serves all trials; only what was killed is started again.
 
 The machine must have time for them: on a busy one, start this by `nice -n -10`.
 """
@@ -238,6 +238,12 @@ def stack_of(rig: RigParams, **simulator: Any) -> Iterator[Stack]:
             rclpy.shutdown()
 
 
+_BAD_PHASES = (
+    PhaseSampleWriter().write(PhaseSample(0, Turn(), Turn(), Turn(), 0)),  # all NaN
+    JointState(name=[FRONT_STANCE], position=[0.0]),
+)
+
+
 class Trial(NamedTuple):
     """What one trial came to."""
 
@@ -255,17 +261,16 @@ def trial(stack: Stack, kind: str, number: int) -> Trial:
     event = time.monotonic()
     if kind in KILLED:
         stack.kill(kind)
-    elif kind == 'nan' and number % 2:
-        stack.phases.publish(JointState(name=[FRONT_STANCE], position=[0.0]))
-    elif kind == 'nan':
-        stack.phases.publish(PhaseSampleWriter().write(PhaseSample(0, Turn(), Turn(), Turn(), 0)))
-    elif number % 2:
+    elif kind == 'heartbeat':
         stack.enabled = False
-        stack.beat(False)
-    else:
-        stack.enabled = False
-        event = stack.last_heartbeat + SynchronizerParams().enable_timeout
-    stack.listen(WATCHED + max(event - time.monotonic(), 0.0))
+        if number % 2:
+            stack.beat(False)
+        else:
+            event = stack.last_heartbeat + SynchronizerParams().enable_timeout
+    while time.monotonic() < event + WATCHED:
+        if kind == 'nan' and stack.state == State.ACTIVE.value:  # as a sick source does, again and again
+            stack.phases.publish(_BAD_PHASES[number % 2])
+        stack.listen(0.005)
     if kind == SYNCHRONIZER.name:
         forces = [(when - event, stack.external_force(sample)) for when, sample in stack.joints]
     else:

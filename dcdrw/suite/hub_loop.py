@@ -110,7 +110,7 @@ class HubLoop:
         torques = begun[2:].tolist()
         for back, torque in enumerate(reversed(torques), 1):
             law.act(-back * self._tick, torque)
-        wheel = Rear(*begun[:2].tolist(), 0)
+        wheel = Rear(float(begun[0]), float(begun[1]), 0)
         states = [begun]
         for step in range(steps):
             for tick in range(self._ticks):
