@@ -38,6 +38,8 @@ SPIN_SECONDS = 0.1
 """How long a spin waits at most before it looks whether a signal came."""
 END_SECONDS = 5.0
 """A node that has not ended so long after a signal is ended by force: DDS was seen to hang for minutes [s]."""
+ACKNOWLEDGED_SECONDS = 0.2
+"""How long a publisher waits for its listeners to have received its last words [s]."""
 LEASE_SECONDS = 1.0
 """The liveliness that a latched topic offers: who asks for as much is told when its publisher is gone [s]."""
 TWIN_SECONDS = 0.2
@@ -420,6 +422,8 @@ def run_all(name: str, make_nodes: Callable[[], list[Node]], args: list[str] | N
     for node in nodes:
         if isinstance(node, HasLastWords):
             node.say_last_words()
+            for publisher in node.publishers:  # what is lost on the way is sent again only while its writer lives
+                publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED_SECONDS))
     # In this order, so that no thread of DDS outlives what it works on: neither waits for Python's own end.
     executor.shutdown()
     for node in nodes:
