@@ -420,9 +420,10 @@ def run_all(name: str, make_nodes: Callable[[], list[Node]], args: list[str] | N
     # A thread without Python ends what hangs: DDS may hold the interpreter.
     faulthandler.dump_traceback_later(END_SECONDS, exit=True, file=open(os.devnull, 'w'))  # noqa: SIM115
     for node in nodes:
+        writers = list(node.publishers)
         if isinstance(node, HasLastWords):
             node.say_last_words()
-            for publisher in node.publishers:  # what is lost on the way is sent again only while its writer lives
+            for publisher in writers:  # what is lost on the way is sent again only while its writer lives
                 publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED_SECONDS))
     # In this order, so that no thread of DDS outlives what it works on: neither waits for Python's own end.
     executor.shutdown()
