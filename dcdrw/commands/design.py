@@ -7,17 +7,21 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from dcdrw.console import Bar, add_json, check_json, positive, tell, tell_where
 from dcdrw.drawings.design_card import draw_card
 from dcdrw.drawings.figure_files import add_formats, figure_files, write_figure
 from dcdrw.files import add_force, refuse_existing, to_json, write_csv, write_text
 from dcdrw.pairs_table import COLUMNS, load_record, pair_lines, pair_records, working
 from dcdrw.parts_list import PartsList, read_parts
-from dcdrw.suite.parameter_file import add_rig_options, chosen_params
+from dcdrw.suite.parameter_file import add_rig_options, chosen_params, read_uncertainty
 from dcdrw.trials.monitored import monitored
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.figures.style import for_print, new_figure
+from dcdrw_sim.identification.unknowns import knowledge, unknowns_of
 from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.model.start import start
 from dcdrw_sim.study.design import (
@@ -37,6 +41,7 @@ from dcdrw_sim.study.design import (
     search,
 )
 from dcdrw_sim.study.loads import preload
+from dcdrw_sim.study.outlook import CANDIDATES, DRAWN, FINAL, Outlook, outlook, surest
 from dcdrw_sim.study.parts import DASHPOT, SPRING, Pair, Part, rank
 from dcdrw_sim.study.sweep import default_seconds
 from dcdrw_sim.study.verdict import Verdict
@@ -51,9 +56,11 @@ SLOPE_SHOWN = math.radians(0.05)
 """Two slopes nearer than this are told as one."""
 LEAST_PRELOAD = 0.05
 """Of a spring [N]: less is none."""
+SEED = 1
+"""Of the rigs that are drawn: the same every time."""
 AFTERWARDS = 30.0
 """The monitor sees so much more of a motion than it takes to come into step, in √(ℓ/g)."""
-FASTEST, FORGIVING, GIVEN = 'fastest', 'most forgiving', 'given'
+FASTEST, FORGIVING, SUREST, GIVEN = 'fastest', 'most forgiving', 'surest', 'given'
 
 _EPILOG = """\
 Steps are those of the front wheel to synchronization, as the monitor counts them: until the error stays within the band
@@ -63,6 +70,9 @@ core has seen it come into step from each start.
 
 The fastest coupler needs fewest steps. The most forgiving needs fewest where k and b are each off by the tolerance
 either way and the slope is a tenth gentler than thought: where parts are bought by their data sheets, take this one.
+
+Where the rig file tells how well the rig is known (dcdrw identify writes that), couplers are also judged on rigs that
+are as likely; the surest is the best on the worst of these.
 
 --available takes a table with a heading, kind,value,name, and a row for each part, separated by commas, semicolons or
 tabs (config/parts.csv shows one). Kind is spring or dashpot, or damper; units stand in the heading (value [N/mm]) or in
@@ -144,13 +154,29 @@ def run(options: argparse.Namespace) -> int:
             bar.begin(WORK)
             grid, *best = search(task, k, b, tolerance, bar.more)
     chosen = {name: assess(task, *pair, tolerance) for name, pair in zip((FASTEST, FORGIVING), best, strict=True)}
+    drawn = _drawn(options, task.rig)
+    if drawn:
+        candidates = grid.order()[:CANDIDATES]
+        ks, bs = grid.k[candidates], grid.b[candidates]
+        if parts:
+            pairs = (working(ranked) or ranked)[:CANDIDATES]
+            ks, bs = np.array([(pair.spring.value, pair.dashpot.value) for pair in pairs]).T
+        few = {name: column[:DRAWN] for name, column in drawn.items()}
+        chosen[SUREST] = assess(task, *surest(task, ks, bs, few), tolerance)
     if options.k:
         chosen[GIVEN] = assess(task, options.k, options.b, tolerance)
     seen = {name: by_monitor(task, found) for name, found in chosen.items()}
     found = json_record(task, chosen, seen, parts, tolerance)
     if parts:
         found |= {'pairs': pair_records(ranked), 'skipped': list(offer.skipped)}
-    lines = chain(summary_lines(task, chosen, seen, parts, tolerance), _offer_lines(ranked, offer, len(task.phases)))
+    outlooks = {name: outlook(task, one.k, one.b, drawn) for name, one in chosen.items()} if drawn else {}
+    for name, one in outlooks.items():
+        found['couplers'][name.replace(' ', '_')]['outlook'] = one._asdict()
+    lines = chain(
+        summary_lines(task, chosen, seen, parts, tolerance),
+        _outlook_lines(outlooks),
+        _offer_lines(ranked, offer, len(task.phases)),
+    )
     tell(options, lines, found)
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
@@ -202,6 +228,26 @@ def _best(pairs: list[Pair]) -> tuple[tuple[float, float], tuple[float, float]]:
     good = working(pairs) or pairs
     fastest, forgiving = good[0], min(good, key=lambda pair: pair.rank_if_off)
     return (fastest.spring.value, fastest.dashpot.value), (forgiving.spring.value, forgiving.dashpot.value)
+
+
+def _drawn(options: argparse.Namespace, rig: RigParams) -> dict[str, Floats]:
+    """Columns of rigs that are as likely as the rig file says; empty where it says nothing."""
+    uncertainty = read_uncertainty(options.rig) if options.rig else None
+    if not uncertainty:
+        return {}
+    unstated = [unknown.name for unknown in unknowns_of(rig) if unknown.name not in uncertainty.errors]
+    known = knowledge(rig, unstated, uncertainty, str(options.rig))
+    return known.draw(FINAL, SEED) if known.unknowns else {}
+
+
+def _outlook_lines(outlooks: dict[str, Outlook]) -> Iterator[str]:
+    if outlooks:
+        yield ''
+        yield f'On {FINAL} rigs as likely as this one is known:'
+    for name, one in outlooks.items():
+        late = '' if math.isnan(one.late_steps) else f'; nine of ten within {one.late_steps:.0f} steps'
+        half = '' if math.isnan(one.median_steps) else f', half of them within {one.median_steps:.0f} steps'
+        yield f'  {name:<14} in step from every start on {100.0 * one.in_step:.0f} %{half}{late}'
 
 
 def _offer_lines(ranked: list[Pair], offer: PartsList, starts: int) -> Iterator[str]:

@@ -7,15 +7,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dcdrw_sim.figures.style import BAND, BLUE, PINK, POINTS, VERMILION, new_figure
+from dcdrw_sim.figures.style import BAND, BLUE, ORANGE, PINK, POINTS, VERMILION, new_figure
 from dcdrw_sim.study.design import GRID, Assessment, Scores, Task
 from dcdrw_sim.study.verdict import Verdict
 
 A4 = 8.27, 11.69
 """[inch]"""
-COLOURS = VERMILION, BLUE, PINK
+COLOURS = VERMILION, BLUE, PINK, ORANGE
 """Colours of the couplers, in their order."""
-MARKERS = '*', 'o', 'D'
+MARKERS = '*', 'o', 'D', 's'
 LETTERS = 120
 """Of a line."""
 LINE = 0.138
@@ -146,7 +146,7 @@ def _draw_paths(axes: Any, task: Task, chosen: dict[str, Assessment]) -> None:
     scale, band = -100.0 / (2.0 * task.rig.rear.alpha), task.band_percent
     axes.axhspan(-band, band, color=BAND, alpha=0.18, linewidth=0, label=f'±{band:g} %')
     shown = 1
-    for (name, found), colour, style in zip(chosen.items(), COLOURS, ('-', '--', ':'), strict=False):
+    for (name, found), colour, style in zip(chosen.items(), COLOURS, ('-', '--', ':', '-.'), strict=False):
         for number, path in enumerate(found.paths):
             error = scale * path[~np.isnan(path)]
             axes.plot(

@@ -177,7 +177,7 @@ def score(task: Task, k: Floats, b: Floats, slope: Floats | None = None, report:
 
     """
     slopes = np.full(len(k), task.rig.slope) if slope is None else slope
-    return Scores(k, b, *_score(task, spread(task.rig, len(k), {'k': k, 'b': b, 'slope': slopes}), report))
+    return Scores(k, b, *score_rigs(task, spread(task.rig, len(k), {'k': k, 'b': b, 'slope': slopes}), report))
 
 
 def search(
@@ -320,7 +320,7 @@ def assess(task: Task, k: float, b: float, tolerance: float = PART_TOLERANCE) ->
 def _sensitivity(task: Task, rig: RigParams, tolerance: float) -> Iterator[Variation]:
     for name in VARIED:
         for factor in (1.0 - tolerance, 1.0 + tolerance):
-            verdict, _, steps, *_ = _score(task, _multiplied(rig, name, np.array([factor])))
+            verdict, _, steps, *_ = score_rigs(task, _multiplied(rig, name, np.array([factor])))
             yield Variation(name, factor, Verdict(int(verdict[0])), float(steps[0]))
 
 
@@ -344,7 +344,7 @@ def _edge(
         spoilt = min(limit, min(rig.front.alpha, rig.rear.alpha) / rig.slope * (1 - 1e-9))
     for _ in range(MARGIN_ROUNDS):
         factors = np.geomspace(good, spoilt, MARGIN_STEPS + 1)
-        verdicts = _score(task, _multiplied(rig, name, factors))[0]
+        verdicts = score_rigs(task, _multiplied(rig, name, factors))[0]
         bad = np.flatnonzero(verdicts > still_good)
         if not bad.size:
             return spoilt, verdict
@@ -363,7 +363,7 @@ def _multiplied(rig: RigParams, name: str, factors: Floats) -> Rigs:
     return spread(rig, len(factors), {name: factors * getattr(rig, name)})
 
 
-def _score(task: Task, rigs: Rigs, report: Report = lambda count: None) -> tuple[NDArray[Any], ...]:
+def score_rigs(task: Task, rigs: Rigs, report: Report = lambda count: None) -> tuple[NDArray[Any], ...]:
     """The columns of `Scores` behind k and b."""
     count = len(rigs.k)
     gentlest = [
