@@ -10,19 +10,13 @@ from dcdrw.console import add_json, check_json, tell, tell_where
 from dcdrw.drawings.figure_files import add_formats, figure_files, write_figure
 from dcdrw.files import add_force, refuse_existing, to_json, write_text
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params
-from dcdrw_msgs_py.quantity import flatten
-from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelParams
+from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
 from dcdrw_sim.figures import model_figures
 from dcdrw_sim.figures.style import PAGE, for_print, new_figure
-from dcdrw_sim.map.return_map import ReturnMap
-from dcdrw_sim.model.wheel import gentlest_slope, limit_cycle_speed
-from dcdrw_sim.relatives import rigid_pair, rimless_wheel
-from dcdrw_sim.relatives.footfall_order import order, rear_lead, steady_contacts
-from dcdrw_sim.relatives.rigid_pair import NEAR_TOGETHER, RigidPair
+from dcdrw_sim.relatives.comparison import GAITS, compare
+from dcdrw_sim.relatives.footfall_order import steady_contacts
+from dcdrw_sim.relatives.rigid_pair import NEAR_TOGETHER
 
-RIGID_PAIR_PHASES = (0.0, NEAR_TOGETHER, 0.25, 0.5, 0.75)
-GAITS = (0.0, 0.25, 0.5, 0.75)
-BANDS = 3
 PICTURES = 'wheel', 'pair', 'footfalls'
 
 _EPILOG = """\
@@ -53,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
         new_figure(1, 1)
         files = figure_files(options.out, PICTURES, options.formats)
         refuse_existing([options.out / 'models.json', *files], options.force)
-    found = json_record(rig)
+    found = compare(rig)
     tell(options, summary_lines(found), found)
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
@@ -63,93 +57,6 @@ def run(options: argparse.Namespace) -> int:
                 write_figure(figure, options.out, name, options.formats, options.force)
         tell_where(options, f'numbers and pictures are in {options.out}')
     return 0
-
-
-def json_record(rig: RigParams) -> dict[str, Any]:
-    """Everything for a program, in SI units and radians; None where there is no such thing.
-
-    Args:
-        rig: the rig, its derived defaults filled in.
-
-    """
-    return {
-        'parameters': flatten(rig),
-        'wheels': {name: _wheel(wheel, rig) for name, wheel in ((FRONT, rig.front), (REAR, rig.rear))},
-        'rigid_pair': _told(_rigid_pair, rig),
-        'coupled_pair': _told(_coupled_pair, rig),
-        'footfalls': [
-            {'phase': phase, 'order': order(steady_contacts(phase)), 'rear_lead': rear_lead(phase)} for phase in GAITS
-        ],
-    }
-
-
-def _told(model: Any, rig: RigParams) -> dict[str, Any]:
-    """What a model comes to, or why it comes to nothing."""
-    try:
-        found: dict[str, Any] = model(rig)
-    except ValueError as error:
-        return {'trouble': str(error)}
-    return found
-
-
-def _wheel(wheel: WheelParams, rig: RigParams) -> dict[str, Any]:
-    slope, gravity = rig.slope, rig.gravity
-    after = float(limit_cycle_speed(wheel, slope, gravity))
-    rolls = not math.isnan(after)
-    return {
-        'omega_after_strike': _known(after),
-        'omega_before_strike': _known(float(limit_cycle_speed(wheel, slope, gravity, wheel.alpha))),
-        'period': _known(rimless_wheel.limit_cycle_period(wheel, slope, gravity)),
-        'velocity': _known(rimless_wheel.limit_cycle_velocity(wheel, slope, gravity)),
-        'energy_per_metre': wheel.mass * gravity * math.sin(slope) if rolls else None,
-        'multiplier': rimless_wheel.multiplier(wheel),
-        'gentlest_slope': gentlest_slope(wheel),
-        'slope_without_standing': wheel.alpha,
-        'slope_of_lift_off': rimless_wheel.steepest_slope(wheel),
-        'omega_to_pass': rimless_wheel.speed_to_pass(wheel, slope, gravity, -wheel.alpha),
-        'uphill_bands': rimless_wheel.uphill_bands(wheel, slope, gravity, BANDS),
-    }
-
-
-def _rigid_pair(rig: RigParams) -> dict[str, Any]:
-    velocity = RigidPair(rig, 0.5).gait().velocity
-    found: dict[str, Any] = {
-        'bar': rig.D0,
-        'phases': [_rigid_gait(rig, phase, velocity) for phase in RIGID_PAIR_PHASES],
-    }
-    if any(gait['velocity'] for gait in found['phases']):
-        phase = rigid_pair.fastest_phase(rig)
-        found['fastest'] = {'phase': phase, 'velocity': RigidPair(rig, phase).gait().velocity}
-    return found
-
-
-def _rigid_gait(rig: RigParams, phase: float, velocity: float) -> dict[str, Any]:
-    pair = RigidPair(rig, phase)
-    gait = pair.gait()
-    rolls = not math.isnan(gait.velocity)
-    slope = math.nan if math.isnan(velocity) else rigid_pair.slope_for_velocity(rig, phase, velocity)
-    feet = [impulse for impact in pair.impacts() for impulse in (impact.front_foot, impact.rear_foot)] if rolls else []
-    return {
-        'phase': phase,
-        'velocity': _known(gait.velocity),
-        'period': _known(gait.period),
-        'multiplier': pair.multiplier,
-        'gentlest_slope': _known(rigid_pair.gentlest_slope_at_phase(rig, phase)),
-        'slope_at_velocity_of_50_percent': _known(slope),
-        'energy_per_metre_at_velocity_of_50_percent': _known(rigid_pair.energy_per_metre(rig._replace(slope=slope))),
-        'pull': max(0.0, -min(feet) / max(feet)) if feet else None,
-    }
-
-
-def _coupled_pair(rig: RigParams) -> dict[str, Any]:
-    return_map = ReturnMap(rig)
-    fixed = return_map.fixed_point()
-    return {
-        'phase': float(return_map.phase(fixed.state)),
-        'period': fixed.period,
-        'velocity': rig.front.step_length / fixed.period,
-        'stable': fixed.stable,
-    }
 
 
 def summary_lines(found: dict[str, Any]) -> Iterator[str]:
@@ -251,10 +158,6 @@ def draw(rig: RigParams, found: dict[str, Any]) -> dict[str, Any]:
         axes.set_xlim(0.0, 2.0)
         axes.label_outer()
     return drawn
-
-
-def _known(value: float) -> float | None:
-    return None if math.isnan(value) else value
 
 
 def _number(value: float | None, digits: int) -> str:
