@@ -4,8 +4,8 @@
                                              └──────────any fault─────────▶ fault ──reset_fault──▶ disabled
 
 A force leaves only in `active`; in `ramp_down` it goes to zero within RAMP_SECONDS; in every other state it is zero. A
-fault is latched. After a stop or a fault, `enable` must be released before it counts again, so that nothing starts by
-itself.
+fault is latched. After a stop, and after a fault was reset, `enable` must be released before it counts again, so that
+nothing starts by itself.
 """
 
 import math
@@ -78,10 +78,10 @@ class Safety:
             self.state, self.reason, self.force, self._locked = State.FAULT, fault, 0.0, True
 
     def reset_fault(self) -> bool:
-        """Forget a fault; whether there was one."""
+        """Forget a fault; whether there was one. A heartbeat that has come back meanwhile does not count yet."""
         if self.state is not State.FAULT:
             return False
-        self.state, self.reason = State.DISABLED, None
+        self.state, self.reason, self._locked = State.DISABLED, None, True
         return True
 
     def update(self, now: float, enabled: bool, ready: bool) -> State:

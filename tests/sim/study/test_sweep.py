@@ -164,7 +164,7 @@ def test_what_is_no_axis_is_refused(text, message):
         ({'x': Axis('k', (1.0, -1.0))}, 'k must be ≥ 0'),
         ({'y': Axis('b', (1.0, 1e9))}, 'b must be'),
         ({'x': Axis('slope_deg', (2.0, 0.5))}, 'too gentle'),
-        ({'x': Axis('none', (1.0,))}, 'no parameter'),
+        ({'x': Axis('none', (1.0,))}, 'is not a parameter'),
     ],
 )
 def test_an_impossible_sweep_is_refused_before_it_starts(tmp_path, change, message):
