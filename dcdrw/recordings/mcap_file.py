@@ -325,6 +325,7 @@ class McapFile(BagFile):
             and told is not None
             and (not self._pieces or told.message_start_time == min(piece.start_ns for piece in self._pieces))
             and bool(self._pieces) == bool(told.message_count)
+            and told.message_count == sum(told.channel_message_counts.values())
             and told.chunk_count == sum(piece.record != piece.begin for piece in self._pieces)
             and all(
                 key in self._channels and self._channels[key].schema_id in self._schemas
