@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dcdrw_msgs_py.quantity import suggestion
+from dcdrw_msgs_py.values import Floats
 from dcdrw_msgs_py.yaml_file import read_yaml, yaml_text
-
-Floats = NDArray[np.float64]
 
 MODELS = {'plumb_bob': (5,), 'rational_polynomial': (8, 12, 14), 'equidistant': (4,)}
 """Distortion models, and how many coefficients each may have.

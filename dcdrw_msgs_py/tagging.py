@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from dcdrw_msgs_py.quantity import Quantity
 from dcdrw_msgs_py.rig import FRONT, REAR
+from dcdrw_msgs_py.values import Floats
 
-Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 

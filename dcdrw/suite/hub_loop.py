@@ -7,20 +7,18 @@ linearized by hand. A small deviation of the rear wheel is followed from each st
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dcdrw_control.sync.rear import LONGEST_DELAY, HubGains, RearLaw
 from dcdrw_control.sync.synchronizer import SynchronizerParams
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.samples import SECOND, PhaseSample, Turn
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.map.holding import MOST_GAIN, Margins, first_unstable
 from dcdrw_sim.map.return_map import Complexes, spectrum
 from dcdrw_sim.model.dynamics import State, accelerations, stance_distance
 from dcdrw_sim.model.start import uncoupled_speed
 from dcdrw_sim.model.wheel import kept
 from dcdrw_sim.rig.person import natural_cadence
-
-Floats = NDArray[np.float64]
 
 SETTLING, WATCHED = 8, 8
 """Steps after which the gait is the loop's own, and steps over which the growth of a deviation is taken."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.recording import BATCH, Recording
-from dcdrw.trials.motion import Floats, Integers, MotionTable
+from dcdrw.trials.motion import Integers, MotionTable
 from dcdrw_msgs_py.topics import (
     FRONT_STANCE,
     PHASE_STATE,
@@ -19,6 +19,7 @@ from dcdrw_msgs_py.topics import (
     SYNC_ERROR,
     SYNC_ERROR_PERCENT,
 )
+from dcdrw_msgs_py.values import Floats
 
 _COLUMNS = ('theta1', 'omega1', 'theta2', 'omega2', 'phi', 'phi_rate')
 _JOINTS = (FRONT_STANCE, REAR_STANCE, PHI_JOINT, STEP_DIFFERENCE_JOINT)

@@ -13,11 +13,12 @@ from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.lone_wheels import LoneWheels
 from dcdrw.suite.parameter_file import TrialParams
 from dcdrw.trials.course import Course, Gap
-from dcdrw.trials.motion import Floats, MotionTable, Sink
+from dcdrw.trials.motion import MotionTable, Sink
 from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.rig import FRONT
 from dcdrw_msgs_py.rolling import phi_pitch
 from dcdrw_msgs_py.samples import SECOND, CouplerSample, Footfall, JointSample, PhaseSample, Turn
+from dcdrw_msgs_py.values import Floats
 from dcdrw_tracker.gait.cadence import CadenceStatus
 from dcdrw_tracker.gait.pair_state import judge
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseStatus

@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dcdrw.trials.analysis import Analysis
-from dcdrw.trials.motion import Floats, MotionTable
+from dcdrw.trials.motion import MotionTable
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.figures.style import BAND, BLACK, COLUMN, WHEELS, for_print, new_figure, save
 
 SCREEN = 10.0

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dcdrw_msgs_py.samples import SECOND
+from dcdrw_msgs_py.values import Floats
 from dcdrw_tracker.gait.cadence import GAP
 
 SHORTEST_GAP_NS = 20_000_000
@@ -21,7 +22,6 @@ FIRST_BIN = 32
 AT_ONCE = 8192
 """Rows that are thinned at once."""
 
-Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 

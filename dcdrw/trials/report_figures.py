@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from dcdrw.trials.day import SIMULATED, RecordedTrial
-from dcdrw.trials.motion import Floats
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.figures.style import BAND, BLACK, BLUE, GREEN, ORANGE, PINK, SKY, VERMILION, new_figure
 
 _COLOURS = BLUE, VERMILION, GREEN, PINK, SKY, ORANGE, BLACK

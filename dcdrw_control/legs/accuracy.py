@@ -3,9 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from dcdrw_msgs_py.values import Floats
 
 CLOSE = 0.015
 """A heel strike that is found so near the true one is exact [s]: motion capture itself tells it to about 10 ms."""

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dcdrw_control.legs.samples import (
     ContactReading,
@@ -24,8 +23,7 @@ from dcdrw_msgs_py.rig import FRONT
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.text_file import read_rows
 from dcdrw_msgs_py.topics import SIDES
-
-Floats = NDArray[np.float64]
+from dcdrw_msgs_py.values import Floats
 
 FASTEST = 35.0
 """No leg turns faster [rad/s], and gyroscopes end at 2000 degrees per second: a file with larger rates is in deg/s."""

@@ -5,13 +5,11 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dcdrw_control.legs.params import LegParams
 from dcdrw_control.legs.samples import Leg, LegReading, LegUpdate
 from dcdrw_control.legs.tracker import HeelStrike, LegTracker, LegTrackerStatus
-
-Floats = NDArray[np.float64]
+from dcdrw_msgs_py.values import Floats
 
 
 class Walk(NamedTuple):

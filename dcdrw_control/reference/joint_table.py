@@ -4,11 +4,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dcdrw_msgs_py.text_file import read_rows
-
-Floats = NDArray[np.float64]
+from dcdrw_msgs_py.values import Floats
 
 DEFAULT = Path(__file__).with_name('gait.csv')
 """Hip and knee of a recorded person: see `recorded_gait`."""

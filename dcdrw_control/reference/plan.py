@@ -8,13 +8,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dcdrw_control.reference.joint_table import JointTable
 from dcdrw_control.reference.params import ReferenceParams
 from dcdrw_msgs_py.samples import SECOND
-
-Floats = NDArray[np.float64]
+from dcdrw_msgs_py.values import Floats
 
 TICK = 0.02
 """From tick to tick [s]: cubic splines between them differ from the table's by less than 1e-3 rad."""

@@ -16,11 +16,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dcdrw_msgs_py.topics import SIDES
-
-Floats = NDArray[np.float64]
+from dcdrw_msgs_py.values import Floats
 
 LEG = 0.9
 """From the hip to the heel of a leg that is stretched [m]."""

@@ -15,9 +15,9 @@ from dcdrw_msgs_py.quantity import Quantity
 from dcdrw_msgs_py.rig import FRONT, REAR, WheelShape
 from dcdrw_msgs_py.samples import JointSample
 from dcdrw_msgs_py.tagging import Mount, TagParams, corners
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.camera.scene import (
     CameraPose,
-    Floats,
     Footing,
     SceneParams,
     ViewParams,

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dcdrw_msgs_py.camera import Camera, pinhole, read_camera
 from dcdrw_msgs_py.quantity import Quantity
@@ -18,8 +18,7 @@ from dcdrw_msgs_py.rig import FRONT, RigParams, Slope, StanceDistance, WheelShap
 from dcdrw_msgs_py.rolling import regular_stance_distance, stance, stance_distance_by_hubs
 from dcdrw_msgs_py.samples import JointSample, Turn
 from dcdrw_msgs_py.tagging import SPACING, Mount, TagParams, mounts
-
-Floats = NDArray[np.float64]
+from dcdrw_msgs_py.values import Floats
 
 LONGEST = 100.0
 """A coupler longer than this is not a measurement [ℓ]."""

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.figures.style import BLACK, BLUE, VERMILION
 from dcdrw_sim.figures.sweep_figures import label_coupler_axes
 from dcdrw_sim.model.scaling import nondimensional
@@ -15,8 +16,6 @@ from dcdrw_sim.motion.ensemble import spread
 from dcdrw_sim.relatives.even_gait import gentlest_even_gait
 from dcdrw_sim.study.regimes import Basin, gentlest_slopes, stall_bands, steepest_stall
 from dcdrw_sim.study.verdict import Verdict
-
-Floats = NDArray[np.float64]
 
 REGIMES = (
     ('walks in step', '#86BAE0', (Verdict.IN_STEP,)),

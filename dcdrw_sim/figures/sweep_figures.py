@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.rolling import phi_pitch, steps_ahead
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.figures.style import BLACK, BLUE, GREEN, ORANGE, PINK, SKY, VERMILION
 from dcdrw_sim.map.regression import Regression, fit_affine, fit_raw
 from dcdrw_sim.model.dynamics import State
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.study.verdict import Verdict
-
-Floats = NDArray[np.float64]
 
 EIGENVALUES = {
     'raw_eigenvalues': "the paper's regression (raw)",

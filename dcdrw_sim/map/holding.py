@@ -11,18 +11,17 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 from scipy.optimize import brentq
 
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.map.return_map import Complexes, FixedPoint, ReturnMap, SectionState, spectrum
 from dcdrw_sim.map.variation import jump, propagators, rates
 from dcdrw_sim.model.dynamics import State
 from dcdrw_sim.motion.pair import Segment
 from dcdrw_sim.motion.trajectory import run
 
-Floats = NDArray[np.float64]
 Target = Literal['cycle', 'time', 'angle']
 TARGETS: tuple[Target, ...] = get_args(Target)
 """cycle: the pair's own limit cycle, where no force is left; time: the rear wheel strikes when half of the front

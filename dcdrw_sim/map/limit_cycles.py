@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dcdrw_msgs_py.values import each
+from dcdrw_msgs_py.values import Floats, each
 from dcdrw_sim.map.return_map import (
     NEWTON_TOLERANCE,
     PROGRESS,
@@ -26,8 +26,6 @@ from dcdrw_sim.model.rigs import Rigs, take
 from dcdrw_sim.model.wheel import kept, kinetic_energy
 from dcdrw_sim.motion.ends import FORWARD, End
 from dcdrw_sim.motion.ensemble import run_pairs, spread
-
-Floats = NDArray[np.float64]
 
 LIMIT = 30
 """Iterations of the search; from a motion that has settled it takes two or three."""

@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.map.limit_cycles import search_fixed_point
-from dcdrw_sim.map.return_map import Complexes, FixedPoint, Floats, NoReturnError, ReturnMap, spectrum
+from dcdrw_sim.map.return_map import Complexes, FixedPoint, NoReturnError, ReturnMap, spectrum
 
 RANK_TOLERANCE = 1e-10
 """Directions of the data below this fraction of the largest count as absent, and A is 0 along them."""

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.map.variation import motion_derivative, rates
 from dcdrw_sim.model.dynamics import State, hub_distance
 from dcdrw_sim.model.start import starts
 from dcdrw_sim.motion.ends import FORWARD, End, accept
 from dcdrw_sim.motion.trajectory import WHEELS, Run, run
 
-Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 NEWTON_TOLERANCE = 1e-12

@@ -18,16 +18,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.rolling import speed_kept
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.map.return_map import Complexes, spectrum
 from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.model.wheel import inertia, kept
-
-Floats = NDArray[np.float64]
 
 SHORTEST, LONGEST = 0.1, 20.0
 """Periods among which a gait is sought, in √(ℓ/g)."""

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from dcdrw_msgs_py.in_step import BAND_PERCENT
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.map.limit_cycles import losses
 from dcdrw_sim.map.regression import TRIAL_PHASES
 from dcdrw_sim.model.rigs import Rigs, take
@@ -26,8 +27,6 @@ from dcdrw_sim.study.loads import Loads, loads
 from dcdrw_sim.study.points import run_starts, section_room, study, uncoupled
 from dcdrw_sim.study.regimes import gentlest_slopes
 from dcdrw_sim.study.verdict import Verdict
-
-Floats = NDArray[np.float64]
 
 PART_TOLERANCE = 0.3
 """Fraction by which a bought part may differ from its data sheet."""

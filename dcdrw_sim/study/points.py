@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dcdrw_msgs_py.in_step import BAND_PERCENT
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.map.limit_cycles import NEUTRAL, LimitCycles, find_limit_cycles, losses
 from dcdrw_sim.map.regression import TRIAL_PHASES, fit_affine, fit_raw
 from dcdrw_sim.map.return_map import Complexes, spectrum
@@ -17,8 +18,6 @@ from dcdrw_sim.model.rigs import Rigs, rig_at, take
 from dcdrw_sim.model.start import require_rolling, starts, uncoupled_speed
 from dcdrw_sim.motion.ensemble import Ensemble, run_pairs
 from dcdrw_sim.study.verdict import BAND, Judgement, Sections, Verdict, judge
-
-Floats = NDArray[np.float64]
 
 ROCKING = 200
 """Room for the strikes of two wheels that rock until they stand: each about ln(1e-6)/ln(cos 30°) = 96."""

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.map.limit_cycles import DIFFERENCE, find_limit_cycles, step_maps
 from dcdrw_sim.map.return_map import spectrum
 from dcdrw_sim.model.rigs import Rigs, rig_at, take
@@ -23,7 +24,6 @@ from dcdrw_sim.relatives.even_gait import even_gait_on, even_pair, even_stall_ba
 from dcdrw_sim.study.points import ROCKING, section_room
 from dcdrw_sim.study.verdict import Judgement, Verdict, judge
 
-Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 BASIN_SECONDS = 400.0

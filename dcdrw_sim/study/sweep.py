@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from dcdrw_msgs_py.in_step import BAND_PERCENT
 from dcdrw_msgs_py.quantity import build, flatten
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, WheelParams
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.map.regression import TRIAL_PHASES
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.rigs import Rigs
@@ -24,7 +25,6 @@ from dcdrw_sim.motion.ensemble import spread
 from dcdrw_sim.study.points import judge_points, section_room
 from dcdrw_sim.study.verdict import BAND
 
-Floats = NDArray[np.float64]
 Block = tuple[slice, slice]
 """Some points: which along x, which along y."""
 

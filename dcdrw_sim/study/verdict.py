@@ -17,12 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dcdrw_msgs_py.in_step import BAND_PERCENT, HOLD_STEPS, in_step_from, strikes_in_step, wrapped_percent
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.model.rigs import Rigs
 from dcdrw_sim.motion.compiled import compiled
 from dcdrw_sim.motion.ends import BACKWARD, FORWARD
 from dcdrw_sim.motion.ensemble import FALLEN, HUBS_MET, STALLED, STANDING, TOO_FAST, Ensemble
-
-Floats = NDArray[np.float64]
 
 BAND = math.radians(1.0)
 """The paper's condition: |θ2| at the section is at most this [rad]."""

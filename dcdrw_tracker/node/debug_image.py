@@ -18,7 +18,6 @@ from dcdrw_tracker.tags.detector import Detection
 from dcdrw_tracker.tags.view_plane import PlaneAxes, fit_similarity
 from dcdrw_tracker.tags.wheel_view import WheelView
 
-Floats = NDArray[np.float64]
 Points = NDArray[np.int32]
 
 FRONT_COLOUR, REAR_COLOUR, TOP_COLOUR, STANCE_COLOUR = (240, 160, 30), (30, 120, 255), (60, 60, 255), (90, 230, 90)

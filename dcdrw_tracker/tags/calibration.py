@@ -15,10 +15,10 @@ from scipy.optimize import minimize_scalar
 
 from dcdrw_msgs_py.rig import FRONT, REAR, WheelShape
 from dcdrw_msgs_py.rolling import stance, step_length
+from dcdrw_msgs_py.values import Floats
 from dcdrw_tracker.tags.view_plane import PlaneAxes
 from dcdrw_tracker.tags.wheel_view import PairView
 
-Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 LONGEST_PAUSE = 0.3

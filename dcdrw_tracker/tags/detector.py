@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from dcdrw_msgs_py.opencv import opencv, tag_dictionary
 from dcdrw_msgs_py.tagging import FAMILIES
+from dcdrw_msgs_py.values import Floats
 from dcdrw_tracker.tags.edges import refine
 from dcdrw_tracker.tags.tag_code import TagReader
 
-Floats = NDArray[np.float64]
 Grey = NDArray[np.uint8]
 Backend = Literal['aruco', 'apriltag']
 

@@ -4,8 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dcdrw_msgs_py.opencv import opencv
-
-Floats = NDArray[np.float64]
+from dcdrw_msgs_py.values import Floats
 
 SAMPLES = 24
 """Profiles taken across each edge."""

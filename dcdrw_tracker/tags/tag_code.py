@@ -5,8 +5,7 @@ from numpy.typing import NDArray
 
 from dcdrw_msgs_py.opencv import opencv, tag_cells
 from dcdrw_msgs_py.tagging import FAMILIES
-
-Floats = NDArray[np.float64]
+from dcdrw_msgs_py.values import Floats
 
 CORRECTED = {'36h11': 2, '16h5': 0, '25h9': 1, '36h10': 2}
 """Wrong cells that are borne, of each family: few enough that nothing else is read as a tag."""

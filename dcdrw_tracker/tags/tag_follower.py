@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dcdrw_msgs_py.values import Floats
 from dcdrw_tracker.tags.detector import BEST_SIDE, SCALES, Detection, TagDetector
-
-Floats = NDArray[np.float64]
 
 REACH = 0.7
 """A tag is searched within this many sides of the place where it must be, and half of the way that it has made."""

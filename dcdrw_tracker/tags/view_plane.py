@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from dcdrw_msgs_py.values import Floats
+
 Complexes = NDArray[np.complex128]
 
 WINDOW = 160

@@ -11,10 +11,10 @@ from dcdrw_msgs_py.camera import Camera
 from dcdrw_msgs_py.quantity import Quantity
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.tagging import Mount, corners, seen, unseen
+from dcdrw_msgs_py.values import Floats
 from dcdrw_tracker.tags.detector import Detection
 from dcdrw_tracker.tags.view_plane import Observation, PlaneAxes, ViewPlane, fit_similarity
 
-Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 

@@ -5,14 +5,12 @@ from collections import deque
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dcdrw_msgs_py.quantity import Quantity
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import PoseSample
+from dcdrw_msgs_py.values import Floats
 from dcdrw_tracker.tags.wheel_view import PairView, WheelView
-
-Floats = NDArray[np.float64]
 
 AXES = 'xyz'
 LONGEST_PAUSE_NS = 100_000_000

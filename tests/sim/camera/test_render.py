@@ -12,8 +12,9 @@ from dcdrw_msgs_py.opencv import tag_cells, tag_dictionary
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.samples import CouplerSample, JointSample, Turn
 from dcdrw_msgs_py.tagging import TagGroup, TagParams, corners
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.camera.render import LookParams, Renderer
-from dcdrw_sim.camera.scene import Floats, Footing, SceneParams, ViewParams, camera_pose
+from dcdrw_sim.camera.scene import Footing, SceneParams, ViewParams, camera_pose
 from tests import ROOT
 
 cv2 = pytest.importorskip('cv2')
