@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import Any, NoReturn
 
 from dcdrw.commands import Command
-from dcdrw.console import Interrupted, in_words
+from dcdrw.console import Interrupted, end_signals, in_words
 
 
 class CommandParser(argparse.ArgumentParser):
@@ -129,21 +129,16 @@ def _raised_signals() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():  # where no signal comes
         yield
         return
-    numbers = [signal.SIGINT, signal.SIGTERM]
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # by nohup
-        numbers.append(signal.SIGHUP)
-    before = {number: signal.signal(number, interrupt) for number in numbers}
     sys.unraisablehook = dropped
     try:
-        yield
+        with end_signals(interrupt):
+            yield
     except Exception as error:
         if asked:
             raise Interrupted(asked[0]) from error
         raise
     finally:
         sys.unraisablehook = sys.__unraisablehook__
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _version() -> str:

@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
@@ -268,18 +268,25 @@ class Interrupted(KeyboardInterrupt):
 
 
 @contextmanager
-def interruptible() -> Iterator[list[int]]:
-    """Signals that ask for an end are noted in the list, so that the work ends between two parts of it."""
-    noted: list[int] = []
+def end_signals(handler: Callable[[int, Any], None]) -> Iterator[None]:
+    """Signals that ask for an end go to this handler; afterwards to whoever had them before."""
     numbers = [signal.SIGINT, signal.SIGTERM]
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as nohup has it
         numbers.append(signal.SIGHUP)
-    before = [signal.signal(number, lambda number, _: noted.append(number)) for number in numbers]
+    before = {number: signal.signal(number, handler) for number in numbers}
     try:
-        yield noted
+        yield
     finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
+
+
+@contextmanager
+def interruptible() -> Iterator[list[int]]:
+    """Signals that ask for an end are noted in the list, so that the work ends between two parts of it."""
+    noted: list[int] = []
+    with end_signals(lambda number, _: noted.append(number)):
+        yield noted
 
 
 def interrupted_status(noted: list[int]) -> int:
