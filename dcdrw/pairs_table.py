@@ -20,20 +20,18 @@ SHOWN = 12
 
 
 def pair_records(pairs: Sequence[Pair]) -> list[dict[str, Any]]:
-    """The pairs that work, the best first, in SI units; None where there is no such number."""
+    """The pairs that work, the best first, in SI units; NaN where there is no such number."""
     records = []
     for rank, pair in enumerate(working(pairs), 1):
         parts = pair.spring.name, pair.spring.value, pair.dashpot.name, pair.dashpot.value
-        if_off = None if math.isnan(pair.steps_if_off) else pair.steps_if_off
-        values = rank, *parts, pair.steps, pair.time, if_off, *load_record(pair).values()
+        values = rank, *parts, pair.steps, pair.time, pair.steps_if_off, *load_record(pair).values()
         records.append(dict(zip(COLUMNS, values, strict=True)))
     return records
 
 
-def load_record(coupler: Pair | Assessment) -> dict[str, float | None]:
-    """What a coupler bears, as `Loads`, in SI units; None where there is no such number."""
-    known = {**coupler.loads._asdict(), 'stroke': coupler.loads.stroke}
-    return {name: None if math.isnan(value) else value for name, value in known.items()}
+def load_record(coupler: Pair | Assessment) -> dict[str, float]:
+    """What a coupler bears, as `Loads`, in SI units; NaN where there is no such number."""
+    return {**coupler.loads._asdict(), 'stroke': coupler.loads.stroke}
 
 
 def working(pairs: Sequence[Pair]) -> list[Pair]:

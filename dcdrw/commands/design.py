@@ -409,18 +409,18 @@ def json_record(
                 'recommended': recommended(found, seen[name]),
                 'monitor_steps': list(seen[name]),
                 'verdict': found.verdict.name.lower(),
-                'worst_steps': _known(found.worst_steps),
-                'worst_time': _known(found.time),
-                'steps': [_known(steps) for steps in found.steps],
-                'strike_steps': [_known(steps) for steps in found.strike_steps],
-                'swing_percent': [_known(50.0 + error) for error in found.swing],
-                'multiplier': _known(found.multiplier),
-                'speed': _known(found.speed),
-                'damper_loss': _known(found.damper_loss),
+                'worst_steps': found.worst_steps,
+                'worst_time': found.time,
+                'steps': list(found.steps),
+                'strike_steps': list(found.strike_steps),
+                'swing_percent': [50.0 + error for error in found.swing],
+                'multiplier': found.multiplier,
+                'speed': found.speed,
+                'damper_loss': found.damper_loss,
                 'loads': load_record(found),
                 'spring_free_length': task.rig.resolved().D0,
                 'spring_preload': preload(task.rig, found.k),
-                'stall_slope': _known(found.stall_slope),
+                'stall_slope': found.stall_slope,
                 'margins': {
                     name: {
                         'low': margin.low,
@@ -437,7 +437,7 @@ def json_record(
                         'parameter': variation.parameter,
                         'factor': variation.factor,
                         'verdict': variation.verdict.name.lower(),
-                        'worst_steps': _known(variation.steps),
+                        'worst_steps': variation.steps,
                     }
                     for variation in found.sensitivity
                 ],
@@ -481,7 +481,3 @@ def _outcome(variation: Variation) -> str:
 
 def _number(steps: float) -> str:
     return '–' if math.isnan(steps) else f'{steps:.0f}'
-
-
-def _known(value: float) -> float | None:
-    return None if math.isnan(value) else value
