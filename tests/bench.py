@@ -31,12 +31,12 @@ class Bench:
         self._stack = ExitStack()
         self.domain = self._stack.enter_context(free_domain())
         self.processes: list[subprocess.Popen[bytes]] = []
-        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
         self.context = Context()
         rclpy.init(args=[], context=self.context, domain_id=self.domain)
         self.node = rclpy.create_node('bench', context=self.context)
         self.executor = StreamExecutor(context=self.context)
         self.executor.add_node(self.node)
+        assert 'fastrtps_port' not in Path('/proc/self/maps').read_text()  # tests/conftest.py says why
 
     def close(self) -> None:
         for process in self.processes:

@@ -18,9 +18,12 @@ if TYPE_CHECKING:
 settings.register_profile('patient', deadline=None)
 settings.load_profile('patient')
 
-# A process that a test kills leaves its locks and segments in Fast DDS's shared memory; a later participant of that
-# domain can lose messages to them, and was seen to crash in SharedMemChannelResource::release when it ended.
-os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
+# On a busy machine, and beside killed processes, Fast DDS makes its ports in shared memory anew, and then crashes
+# when a participant ends (SharedMemChannelResource::release). The range LOCALHOST always brings shared memory: tests
+# keep to this machine by a profile of their own.
+os.environ.update(
+    ROS_AUTOMATIC_DISCOVERY_RANGE='SUBNET', FASTRTPS_DEFAULT_PROFILES_FILE=str(ROOT / 'tests' / 'data' / 'loopback.xml')
+)
 
 
 @pytest.fixture

@@ -69,7 +69,7 @@ def ended(arguments: list[str], number: int, delay: float, folder: Path) -> tupl
     process = subprocess.Popen(
         [sys.executable, '-m', 'dcdrw.entry', *arguments],
         cwd=folder,
-        env={**os.environ, 'PYTHONPATH': str(ROOT), 'MARK': mark, 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'},
+        env={**os.environ, 'PYTHONPATH': str(ROOT), 'MARK': mark},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,

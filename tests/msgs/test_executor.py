@@ -1,6 +1,5 @@
 """Streams over real DDS within one process: timers go on, queues stay bounded, and what is old is dropped and told."""
 
-import os
 import time
 from collections.abc import Callable, Iterator
 from itertools import pairwise
@@ -48,7 +47,6 @@ class Pair:
 
 @pytest.fixture
 def pair() -> Iterator[Pair]:
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     with free_domain() as domain:
         pair = Pair(domain)
         yield pair
