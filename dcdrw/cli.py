@@ -1,7 +1,6 @@
 """The command `dcdrw`: which commands there are. The module of one is imported when it is chosen."""
 
 import sys
-from textwrap import fill
 
 from dcdrw.commands import Command
 from dcdrw.entry import EXECUTABLES
@@ -52,7 +51,7 @@ examples:
   dcdrw urdf --rig my_rig.yaml            the rig as a URDF, for robot_state_publisher and RViz
   dcdrw models --out models               the single wheel and the rigid pair, to compare with
   dcdrw tags --out tags.pdf               the tags of the wheels, to print
-  dcdrw film --out trial.mp4 --pan-deg 30 a simulated trial as a camera sees it, with its ground truth
+  dcdrw film --out trial.mp4 --pan-deg 30  a simulated trial as a camera sees it, with its ground truth
   dcdrw calibrate roll.mp4 --camera camera.yaml --rig my_rig.yaml --out calibrated.yaml
   dcdrw track trial.mp4 --camera camera.yaml --rig calibrated.yaml --out trials/first
   dcdrw simulate case.json --strikes strikes.json --trajectory motion.csv --rate 200
@@ -61,7 +60,7 @@ completion in bash and zsh, with argcomplete installed:
   eval "$(register-python-argcomplete dcdrw)"
 
 nodes, each run by `ros2 run dcdrw NAME`:
-""" + fill(', '.join(name for name in EXECUTABLES if name != 'dcdrw'), 100, initial_indent='  ', subsequent_indent='  ')
+""" + f'  {", ".join(name for name in EXECUTABLES if name != "dcdrw")}\n'
 
 
 def main(arguments: list[str] | None = None) -> int:

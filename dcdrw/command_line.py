@@ -13,13 +13,14 @@ from typing import Any, NoReturn
 
 from dcdrw.commands import Command
 from dcdrw.console import Interrupted, end_signals, in_words
+from dcdrw.help_text import HelpFormatter
 
 
 class CommandParser(argparse.ArgumentParser):
     """The parser of one command: its module is imported, and tells the arguments, when the command is chosen."""
 
     def __init__(self, module: str = '', **kwargs: Any) -> None:
-        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **kwargs)
+        super().__init__(formatter_class=HelpFormatter, **kwargs)
         self._module = module
 
     def load(self) -> None:

@@ -150,8 +150,8 @@ def _experiment(book: Book) -> Any:
 
 def _regimes(book: Book) -> Any:
     """What becomes of a pair over stiffness and damping, and over slope and damping."""
-    figure = new_figure(PAGE, 4.5)
-    (coupler, preloaded, slope), rooms = figure.subplots(2, 3, height_ratios=(3.0, 2.1))
+    figure = new_figure(PAGE, 4.7)
+    (coupler, preloaded, slope), rooms = figure.subplots(2, 3, height_ratios=(3.0, 2.3))
     for axes, name, rig, title in (
         (coupler, 'paper-long', PAPERS_SWEEP, 'D0 = S0 + ℓ sin α: no preload'),
         (preloaded, 'preloaded-long', PRELOADED, 'D0 = S0: preloaded'),

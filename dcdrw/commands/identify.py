@@ -18,7 +18,7 @@ from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.topics import JOINT_STATES
 from dcdrw_sim.figures.identification_figures import draw_identification
-from dcdrw_sim.figures.style import new_figure
+from dcdrw_sim.figures.style import for_print, new_figure
 from dcdrw_sim.identification.findings import (
     COMBINATIONS,
     Finding,
@@ -136,8 +136,9 @@ def _write(options: argparse.Namespace, outcome: Outcome, found: dict[str, Any])
     remark = f'As dcdrw identify found it in {", ".join(map(str, options.recordings))}'
     write_changed(options.rig, changes, options.out / RIG, remark, fit.after.uncertainty)
     write_text(options.out / RESULT, to_json(found), options.force)
-    figure = draw_identification(fit, outcome.found, outcome.profiles)
-    write_figure(figure, options.out, FIGURE, options.formats, options.force)
+    with for_print():
+        figure = draw_identification(fit, outcome.found, outcome.profiles)
+        write_figure(figure, options.out, FIGURE, options.formats, options.force)
     tell_where(options, f'\nThe rig file, the figure and all numbers are in {options.out}.')
 
 

@@ -121,6 +121,8 @@ def _draw_map(axes: Any, grid: Scores, chosen: dict[str, Assessment], on_sale: M
             markersize=9,
             label=name,
             linestyle='none',
+            clip_on=False,
+            zorder=3,
         )
     for kind, line in (('spring', axes.axhline), ('dashpot', axes.axvline)):
         for value in on_sale[kind]:

@@ -192,7 +192,7 @@ RIG_OPTIONS = {
 def add_rig_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that choose a rig."""
     presets = '; '.join(f'{name}, {preset.doc}' for name, preset in PRESETS.items())
-    group = parser.add_argument_group('the rig: a preset, then what a file changes, then what an option does')
+    group = parser.add_argument_group('the rig', 'A preset, then what a file changes, then what an option does.')
     group.add_argument('--preset', choices=PRESETS, default='paper', metavar='NAME', help=f'{presets} (default: paper)')
     group.add_argument(
         '--rig', type=Path, metavar='FILE.yaml', help='a ROS 2 parameter file, as config/rig.yaml; all may be left out'

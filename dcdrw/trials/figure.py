@@ -15,8 +15,8 @@ from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.figures.style import BAND, BLACK, COLUMN, WHEELS, for_print, new_figure, save
 
-SCREEN = 10.0
-"""Width on a screen [inch]."""
+SCREEN = 9.0
+"""Width on a screen [inch]; on a printed page its letters are of POINTS still."""
 LETTERS = 15
 """Letters of POINTS that an inch of a title's line holds."""
 _FORCE = '#555555'

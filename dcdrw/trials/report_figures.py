@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from dcdrw.trials.day import SIMULATED, RecordedTrial
+from dcdrw.trials.figure import SCREEN
 from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.figures.style import BAND, BLACK, BLUE, GREEN, ORANGE, PINK, SKY, VERMILION, new_figure
 
@@ -100,7 +101,7 @@ def _thinned(trial: RecordedTrial) -> tuple[Floats, Floats]:
 
 
 def _axes() -> tuple[Any, Any]:
-    figure = new_figure(10, 3.6)
+    figure = new_figure(SCREEN, 3.3)
     axes = figure.subplots()
     axes.spines[['top', 'right']].set_visible(False)
     axes.margins(x=0.01)

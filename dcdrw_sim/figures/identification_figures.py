@@ -8,7 +8,7 @@ import numpy as np
 
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.rolling import stance
-from dcdrw_sim.figures.style import BLACK, ORANGE, WHEELS, new_figure
+from dcdrw_sim.figures.style import BLACK, ORANGE, PAGE, WHEELS, new_figure
 from dcdrw_sim.identification.findings import NORMAL_90, Finding, Profile
 from dcdrw_sim.identification.fit import Explained, Fit
 
@@ -24,8 +24,8 @@ def draw_identification(fit: Fit, found: Sequence[Finding], profiles: Sequence[P
 
     """
     lower = math.ceil(len(profiles) / COLUMNS)
-    figure = new_figure(11.0, 2.6 * len(fit.trials) + 2.0 * lower, 'the figure of an identification')
-    grid = figure.add_gridspec(len(fit.trials) + lower, COLUMNS, height_ratios=[2.6] * len(fit.trials) + [2.0] * lower)
+    figure = new_figure(PAGE, 2.1 * len(fit.trials) + 1.5 * lower, 'the figure of an identification')
+    grid = figure.add_gridspec(len(fit.trials) + lower, COLUMNS, height_ratios=[2.1] * len(fit.trials) + [1.5] * lower)
     for row, trial in enumerate(fit.trials):
         _draw_phase(figure.add_subplot(grid[row, :2]), fit, trial, row)
         _draw_left(figure.add_subplot(grid[row, 2]), trial)

@@ -65,6 +65,25 @@ def test_help_is_what_the_table_says(capsys):
     assert all(f'{name} {command.help}' in told for name, command in COMMANDS.items())
 
 
+@pytest.mark.parametrize('columns', [60, 80, 120])
+@pytest.mark.parametrize('arguments', [(), *((name,) for name in COMMANDS)], ids=['all', *COMMANDS])
+def test_help_fits_the_terminal(arguments, columns, capsys, monkeypatch):
+    monkeypatch.setenv('COLUMNS', str(columns))
+    with pytest.raises(SystemExit):
+        main([*arguments, '--help'])
+    assert max(map(len, capsys.readouterr().out.splitlines())) < columns
+
+
+def test_help_keeps_its_rows_and_commands_that_can_be_pasted(capsys, monkeypatch):
+    monkeypatch.setenv('COLUMNS', '60')
+    with pytest.raises(SystemExit):
+        main(['figures', '--help'])
+    told = capsys.readouterr().out
+    assert '  pair          Mean speed and energy lost per metre\n                against the phase, of' in told
+    assert '  dcdrw figures --out figures --only regimes basin \\\n      --format png,pdf\n' in told
+    assert '  dcdrw figures --out figures\n      all of them\n' in told
+
+
 @pytest.mark.parametrize('command', COMMANDS.values(), ids=COMMANDS)
 def test_every_command_has_what_the_command_line_asks_of_it(command):
     module = import_module(f'dcdrw.commands.{command.module}')

@@ -8,6 +8,7 @@ from dcdrw.cli import main
 from dcdrw.commands import figures
 from dcdrw_sim.study.sweep import compute, papers_sweep
 from dcdrw_sim.study.sweep_dataset import open_sweep, sweep_of
+from tests.drawn import readable_figures
 
 pytest.importorskip('matplotlib')
 pytest.importorskip('netCDF4')
@@ -28,7 +29,9 @@ def draw(tmp_path, *options):
 
 
 def test_every_figure_is_drawn(tmp_path, capsys):
-    assert draw(tmp_path) == 0
+    with readable_figures() as drawn:
+        assert draw(tmp_path) == 0
+    assert len(drawn) == len(figures.FIGURES)
     written = sorted(path.name for path in (tmp_path / 'out').iterdir())
     assert written == sorted(f'{name}.png' for name in figures.FIGURES)
     captured = capsys.readouterr()

@@ -12,6 +12,7 @@ from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_sim.rig.simulator import SimulatedRig, SimulatorParams
 from dcdrw_tracker.gait.phase import PhaseParams
+from tests.drawn import readable_figures
 
 pytest.importorskip('matplotlib')
 WHEEL = WheelParams(gyration=0.5, restitution=0.05)
@@ -27,7 +28,8 @@ def identified(tmp_path_factory):
     record_joints(folder / 'trial', [sample for sample in samples if sample], PhaseParams(), (), {})
     (folder / 'rig.yaml').write_text(RIG)
     arguments = ['identify', folder / 'trial', '--rig', folder / 'rig.yaml', '--fix', 'mass,slope']
-    assert main([*map(str, arguments), '--out', str(folder / 'out')]) == 0
+    with readable_figures():
+        assert main([*map(str, arguments), '--out', str(folder / 'out')]) == 0
     return folder
 
 

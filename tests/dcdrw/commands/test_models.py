@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from dcdrw.cli import main
+from tests.drawn import readable_figures
 
 FORM = '/**:\n  ros__parameters:\n    {}\n'
 
@@ -38,7 +39,8 @@ def test_table_sets_the_models_side_by_side(capsys):
 def test_folder_gets_numbers_and_pictures(tmp_path, capsys):
     pytest.importorskip('matplotlib')
     out = tmp_path / 'new' / 'models'
-    assert main(['models', '--out', str(out)]) == 0
+    with readable_figures():
+        assert main(['models', '--out', str(out)]) == 0
     assert {path.name for path in out.iterdir()} == {'models.json', 'wheel.png', 'pair.png', 'footfalls.png'}
     assert all(path.read_bytes().startswith(b'\x89PNG') for path in out.glob('*.png'))
     found = json.loads((out / 'models.json').read_text(encoding='utf-8'))
@@ -53,7 +55,8 @@ def test_folder_gets_numbers_and_pictures(tmp_path, capsys):
 def test_unequal_wheels_are_told_one_by_one_and_have_no_pair(tmp_path, capsys):
     pytest.importorskip('matplotlib')
     out = tmp_path / 'out'
-    assert main(['models', '--rig', written(tmp_path, 'rear.spokes: 13'), '--out', str(out)]) == 0
+    with readable_figures():
+        assert main(['models', '--rig', written(tmp_path, 'rear.spokes: 13'), '--out', str(out)]) == 0
     text = capsys.readouterr().out
     assert 'front wheel by itself' in text
     assert 'rear wheel by itself' in text
