@@ -31,7 +31,8 @@ COMMANDS = {
 }
 
 _DESCRIPTION = 'Two rimless wheels on a slope, joined by a spring and a damper: simulate them, run and judge trials.'
-_EPILOG = """\
+_EPILOG = (
+    """\
 examples:
   dcdrw trial                             the paper's trial, half a minute, with summary and picture
   dcdrw trial --rig my_rig.yaml --initial-phase 35 --seconds 20
@@ -60,7 +61,9 @@ completion in bash and zsh, with argcomplete installed:
   eval "$(register-python-argcomplete dcdrw)"
 
 nodes, each run by `ros2 run dcdrw NAME`:
-""" + f'  {", ".join(name for name in EXECUTABLES if name != "dcdrw")}\n'
+"""
+    + f'  {", ".join(name for name in EXECUTABLES if name != "dcdrw")}\n'
+)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -17,11 +17,11 @@ from dcdrw_sim.model.presets import PRESETS
 
 _EPILOG = """\
 FILE ends in .mp4 (MPEG-4, small), .avi (Motion JPEG) or .mkv (FFV1, nothing is lost). Beside FILE.mp4 come
-  FILE.csv          the truth of each frame: stamp_ns, ψ, ω of both wheels, φ (SI units, radians) and n
+  FILE.csv          the truth of each frame taken: stamp_ns, ψ, ω of both wheels, φ (SI units, radians) and n
   FILE.strikes.csv  each strike: wheel, stamp_ns, the foot's place x down the slope, the wheel's steps after it
   FILE.camera.yaml  the camera, as camera_calibration would write it
   FILE.rig.yaml     the rig, its tags and how the camera stands, as a ROS 2 parameter file
-  FILE.stamps.csv   only with --drop: stamp_ns of each frame that is in the video, which then has gaps
+  FILE.stamps.csv   only with --drop: stamp_ns of each frame; in the place of a lost one the last is repeated
 A stamp is the middle of the exposure, from the start of the trial on. Ctrl-C ends the film; what was filmed is kept.
 """
 
@@ -99,9 +99,10 @@ def run(options: argparse.Namespace) -> int:
             stopped=interrupted,
             report=bar.reach,
         )
+    lost = f', {filmed.lost} of them lost' if filmed.lost else ''
     end = f'; ended at {filmed.trouble}' if filmed.trouble else '; interrupted' if interrupted else ''
     print(
-        f'{filmed.frames} frames, {filmed.frames / options.fps:.1f} s of video{end}. Written: {files.video}, and '
+        f'{filmed.frames} frames, {filmed.frames / options.fps:.1f} s of video{lost}{end}. Written: {files.video}, and '
         f'beside it {", ".join(file.name for file in files[1:] if file.exists())}'
     )
     return interrupted_status(interrupted) if interrupted else 1 if filmed.trouble else 0

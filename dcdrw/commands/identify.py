@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from dcdrw.console import add_json, check_json, number, tell, tell_where
 from dcdrw.drawings.figure_files import add_formats, figure_files, write_figure
-from dcdrw.files import add_force, refuse_existing, to_json, write_text
+from dcdrw.files import add_force, refuse_existing, to_json, write_text, write_whole
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file, read_uncertainty, write_changed
 from dcdrw.trials.motion import Whole
 from dcdrw.trials.results import read_trial
@@ -134,7 +134,8 @@ def _write(options: argparse.Namespace, outcome: Outcome, found: dict[str, Any])
         if any(name in unknown.parameters for unknown in fit.known.unknowns)
     }
     remark = f'As dcdrw identify found it in {", ".join(map(str, options.recordings))}'
-    write_changed(options.rig, changes, options.out / RIG, remark, fit.after.uncertainty)
+    with write_whole(options.out / RIG, options.force) as path:
+        write_changed(options.rig, changes, path, remark, fit.after.uncertainty)
     write_text(options.out / RESULT, to_json(found), options.force)
     with for_print():
         figure = draw_identification(fit, outcome.found, outcome.profiles)

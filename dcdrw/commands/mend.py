@@ -4,6 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from dcdrw.files import free_folder
 from dcdrw.recordings.mending import mend
 from dcdrw.recordings.recording import Recording
 
@@ -26,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
+    free_folder(options.out)
     with Recording(options.recording) as recording:
         count = mend(recording, options.out)
         for text in recording.damage:

@@ -54,10 +54,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
-    cases, is_list = read_cases(options.cases)
     if options.trajectory and options.trajectory.suffix not in _WRITERS:
         raise ValueError(f'--trajectory must end in {" or ".join(_WRITERS)}, got {options.trajectory}')
     refuse_existing(filter(None, (options.strikes, options.trajectory)), options.force)
+    cases, is_list = read_cases(options.cases)
     runs = []
     for case in cases:
         result = integrate(case.rig, case.state, strikes=options.count or case.listed_strikes)

@@ -61,13 +61,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
+    folder = free_folder(options.out)
+    check_json(options)
+    refuse_existing([options.debug] if options.debug else [], options.force)
     film = TrackedVideo(options)
     trial_params = TrialParams()
     if options.rig:
         trial_params = read_parameter_file(options.rig, trial_params)
-    folder = free_folder(options.out)
-    check_json(options)
-    refuse_existing([options.debug] if options.debug else [], options.force)
     with ExitStack() as stack:
         debug = stack.enter_context(debug_video(options.debug, film, options.force)) if options.debug else None
         frames: list[Tracked] = []

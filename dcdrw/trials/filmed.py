@@ -69,7 +69,7 @@ def add_film_arguments(parser: argparse.ArgumentParser) -> None:
         '--stamps',
         type=Path,
         metavar='FILE.csv',
-        help='a line with the time stamp in ns for each frame, after a heading',
+        help='a line with the time stamp in ns for each frame, after a heading; the same again: a frame repeated',
     )
     parser.add_argument('--frame-rate', type=positive, metavar='HZ', help='of the camera, in the place of time stamps')
     parser.add_argument(
@@ -173,13 +173,15 @@ class TrackedVideo:
             raise ValueError(f'{self.path}: {error}') from None
 
     def _frames(self) -> Iterator[Frame]:
+        stamp: int | None = None
         for index, frame in enumerate(self.video.frames()):
             if not self._stamps:
                 yield frame
-            elif index < len(self._stamps):
-                yield frame._replace(stamp_ns=self._stamps[index])
-            else:
+            elif index >= len(self._stamps):
                 raise ValueError(f'{self.path} has more frames than there are time stamps: {len(self._stamps)}')
+            elif self._stamps[index] != stamp:  # else the last frame, repeated in the place of one that was lost
+                stamp = self._stamps[index]
+                yield frame._replace(stamp_ns=stamp)
 
     def _read_stamps(self, options: argparse.Namespace) -> list[int]:
         beside = Files.of(options.video).stamps
@@ -190,7 +192,7 @@ class TrackedVideo:
             stamps = [int(line.split(',')[0]) for line in path.read_text(encoding='utf-8').split()[1:]]
         except ValueError as error:
             raise ValueError(f'{path} must have a heading, then a time stamp in ns a line: {error}') from None
-        if not stamps or min(np.diff(stamps), default=1) <= 0:
+        if not stamps or min(np.diff(stamps), default=0) < 0:
             raise ValueError(f'{path}: the time stamps must grow from line to line')
         return stamps
 

@@ -65,6 +65,8 @@ class FilmResult(NamedTuple):
 
     frames: int
     """Number of frames in the video."""
+    lost: int
+    """Those in whose place the one before was repeated."""
     trouble: str
     """Why the motion ended before the film; empty where it did not."""
 
@@ -88,7 +90,8 @@ def film_trial(
         count: frames to take.
         fps: of them per second.
         colour: or grey.
-        drop: frames that are lost at random, by the seed of the image noise [%].
+        drop: frames that are lost at random, by the seed of the image noise [%]; the one before is repeated in the
+            place of each, so that the video keeps its own time.
         force: overwrite files.
         stopped: is looked at between frames; once it holds something, the film ends with what there is.
         report: told the number of each frame.
@@ -111,6 +114,7 @@ def film_trial(
         video = stack.enter_context(writing_video(files.video, fps, (camera.width, camera.height), colour, force))
         lost, footing = random.Random(params.look.image_seed), None
         trouble = ''
+        taken: list[int] = []
         shots = Shots(simulation)
         for k in range(count):
             if stopped:
@@ -123,15 +127,16 @@ def film_trial(
             strikes.add(shots.strikes(motion))
             footing = footing or Footing(params.scene, joints)
             report(k + 1)
-            if lost.random() * 100.0 < drop:
-                continue
-            video.write(renderer.draw(footing, joints, k / fps))
-            truth.add([shots.truth(joints)])
+            if lost.random() * 100.0 >= drop or not taken:
+                picture = renderer.draw(footing, joints, k / fps)
+                truth.add([shots.truth(joints)])
+                taken.append(joints.stamp_ns)
+            video.write(picture)
             if stamps:
-                stamps.add([(joints.stamp_ns,)])
+                stamps.add([taken[-1:]])
     if not drop:
         files.stamps.unlink(missing_ok=True)  # of a film that this one overwrites
-    return FilmResult(video.frames, trouble)
+    return FilmResult(video.frames, video.frames - len(taken), trouble)
 
 
 class Shots:

@@ -34,6 +34,8 @@ def draw_identification(fit: Fit, found: Sequence[Finding], profiles: Sequence[P
     for index, profile in enumerate(profiles):
         axes = figure.add_subplot(grid[len(fit.trials) + index // COLUMNS, index % COLUMNS])
         _draw_profile(axes, by_name[profile.name], profile)
+        if index % COLUMNS == 0:
+            axes.set_ylabel('deviance')
     return figure
 
 
@@ -56,10 +58,9 @@ def _draw_left(axes: Any, trial: Explained) -> None:
     seconds = trial.samples.seconds + trial.samples.begins
     for wheel, name in enumerate((FRONT, REAR)):
         kept = ~trial.outliers[:, wheel]
-        axes.plot(seconds[kept], np.degrees(trial.residuals[kept, wheel]), '.', ms=2, color=WHEELS[name], label=name)
+        axes.plot(seconds[kept], np.degrees(trial.residuals[kept, wheel]), '.', ms=2, color=WHEELS[name])
     left = int(trial.outliers.sum())
     axes.set(xlabel='time [s]', ylabel='residual [°]', title=f'rms {math.degrees(trial.noise):.3f}°, {left} left out')
-    axes.legend(frameon=False, markerscale=4)
 
 
 def _draw_over_stance(axes: Any, fit: Fit, trial: Explained) -> None:
@@ -74,8 +75,9 @@ def _draw_over_stance(axes: Any, fit: Fit, trial: Explained) -> None:
             *((0.5 * (edges[i] + edges[i + 1]), residuals[which == i].mean()) for i in range(12) if (which == i).any()),
             strict=True,
         )
-        axes.plot(np.degrees(middles), np.degrees(means), color=WHEELS[name], lw=2.0)
-    axes.set(xlabel='stance angle θ [°]', ylabel='residual [°]', title='residuals over the stance angle')
+        axes.plot(np.degrees(middles), np.degrees(means), color=WHEELS[name], lw=2.0, label=name)
+    axes.set(xlabel='stance angle θ [°]', ylabel='residual [°]')
+    axes.legend(loc='lower center', bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False, borderaxespad=0.1)
 
 
 def _draw_profile(axes: Any, finding: Finding, profile: Profile) -> None:

@@ -5,17 +5,20 @@ import json
 import re
 from html.parser import HTMLParser
 from io import StringIO
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
 from dcdrw.cli import main
+from dcdrw.trials import report_page
 from dcdrw.trials.day import table
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatorParams
 from tests.bags import joint_state, write_bag
 from tests.chromium import Chromium
+from tests.drawn import assert_readable
 
 pytestmark = pytest.mark.processes
 
@@ -62,7 +65,15 @@ def report(tmp_path_factory, live_trial):
     folder = tmp_path_factory.mktemp('report')
     bag = measured_bag(folder / 'bag', 0.3)
     path = folder / 'today.html'
-    assert main(['report', str(live_trial), str(bag), '--title', 'A <day>', '--out', str(path)]) == 0
+
+    svg = report_page._svg
+
+    def readable(figure):
+        assert_readable(figure)
+        return svg(figure)
+
+    with patch.object(report_page, '_svg', readable):
+        assert main(['report', str(live_trial), str(bag), '--title', 'A <day>', '--out', str(path)]) == 0
     return path
 
 
