@@ -135,6 +135,8 @@ HINTS: dict[Hint, str] = {
     'rear_sign': 'the rear wheel rolls uphill: is its sign right? (parameter rear_sign)',
     'rollover': "an encoder's counter rolls over within a turn, perhaps also before the start: where is its zero? "
     '(parameter rollover, which takes a start in its upper half for one below 0)',
+    'lone_jump': "one wheel's rotation jumped alone: does its encoder's counter roll over? "
+    '(parameter rollover, by how much)',
     'revolutions': 'the wheels turn slower than they can roll: are their rotations in revolutions? (parameter unit)',
     'unit': 'the wheels turn faster than they can roll: are their rotations in degrees? (parameter unit)',
 }

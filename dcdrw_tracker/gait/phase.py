@@ -23,7 +23,7 @@ is not a number, the stamp stands still, goes back or lies ahead of the clock, o
 Cause = Literal['announced', 'stamp', 'rotation']
 """Why the source is taken to have started anew: it says so, its stamps went back, or its rotations jumped."""
 
-Hint = Literal['front_sign', 'rear_sign', 'unit', 'revolutions', 'rollover']
+Hint = Literal['front_sign', 'rear_sign', 'unit', 'revolutions', 'rollover', 'lone_jump']
 """A parameter that is probably set wrongly, judged by how the wheels seem to turn."""
 
 LARGEST_ROTATION = 1e9
@@ -299,7 +299,15 @@ class PhaseEstimator:
             hints.append('rear_sign')
         if not (self._front.is_zero_known and self._rear.is_zero_known):
             hints.append('rollover')
+        if any(map(self._jumped_alone, self._restarted)):
+            hints.append('lone_jump')
         return tuple(hints)
+
+    def _jumped_alone(self, restart: Restart) -> bool:
+        """Whether one wheel alone jumped by more than a step, as a counter does that rolls over."""
+        pitches = 2.0 * self.params.front.alpha, 2.0 * self.params.rear.alpha
+        jumped = [abs(jump) > pitch for jump, pitch in zip((restart.front, restart.rear), pitches, strict=True)]
+        return restart.cause == 'rotation' and sum(jumped) == 1
 
     def _is_unstamped(self, joints: JointSample) -> bool:
         """Whether a stamp of zero is none: the wheels have turned since the last one, which was zero, too."""

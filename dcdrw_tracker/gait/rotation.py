@@ -16,7 +16,9 @@ LEAST_COUNT = 1e-6
 """A finer encoder is none: rotations that are no multiples of a count [rad]."""
 LEARNING = 500
 """Samples of a moving wheel from which the count is learned."""
-FEWEST_BITS = 10
+LEAST_WIDTH = 1e-3
+"""Less is rounding, and no counter that rolls over [rad]."""
+FEWEST_BITS = 8
 """No counter of an encoder rolls over after fewer counts than two to this power."""
 
 
@@ -70,6 +72,8 @@ class Rotation:
         self._unlearned = LEARNING
         self._count = math.inf
         """Angle of one count of the source's encoder; infinite before the wheel has turned, 0 where there is none."""
+        self._width = math.nan
+        """By how much the source's counter was seen to roll over [rad]; NaN where it was not yet."""
         self.rollovers = 0
         """How often the source's counter has rolled over."""
         self.is_zero_known = True
@@ -133,30 +137,37 @@ class Rotation:
         against = min(fastest, self.pitch) + slack
         low, high = (-against, along) if self.pace >= 0.0 else (-along, against)
         lost = 0.0
-        told = not math.isnan(tolerance.rollover)
-        if self._wraps or (self._wraps is None and not told and not low <= moved <= high and not self.may_step(dt)):
-            lost = -math.tau * round((moved - self.pace * dt) / math.tau)
-        if not low <= moved + lost <= high:
-            lost = 0.0 if self.may_step(dt) else self._rolled_over(angle, dt, tolerance)
+        whole = -math.tau * round((moved - self.pace * dt) / math.tau)
+        if self._wraps:
+            lost = whole
+        elif not low <= moved <= high and not self.may_step(dt):
+            lost = self._rolled_over(angle, dt, tolerance)
+            is_exact = not math.isnan(tolerance.rollover) or 0.0 < self._count < math.inf
+            if not lost and self._wraps is None and not is_exact:
+                lost = whole
         return angle + (self._offset + lost) if low <= moved + lost <= high else None
 
     def _rolled_over(self, angle: float, dt: float, tolerance: Tolerance) -> float:
         """What a counter has lost that rolled over: whole turns, 2ᵏ counts, or all from one end to the other; or 0.
 
-        A counter that rolls over jumps against the motion, and goes on where the motion takes it.
+        A counter that rolls over jumps against the motion, and goes on where the motion takes it; one whose width is
+        known may jump back again.
         """
         moved, along = angle - self._raw, self.pace * dt
         jump = moved - along
-        if jump * along >= 0.0:
-            return 0.0
         slack = 2.0 * tolerance.hysteresis + 0.5 * abs(along)
-        widths = math.tau * round(abs(jump) / math.tau), self._counter(abs(jump))
-        for width in widths if math.isnan(tolerance.rollover) else (tolerance.rollover,):
+        known = self._width if math.isnan(tolerance.rollover) else tolerance.rollover
+        if math.isnan(known) and jump * along >= 0.0:
+            return 0.0
+        for width in self._widths(abs(jump)) if math.isnan(known) else (known,):
             if width and abs(abs(jump) - width) <= slack:
                 return math.copysign(width, -jump)
-        if abs(jump) > math.tau and abs(angle + self._raw) <= slack:
-            return -jump
-        return 0.0
+        from_end_to_end = math.isnan(known) and abs(jump) > math.tau and abs(angle + self._raw) <= slack
+        return -jump if from_end_to_end else 0.0
+
+    def _widths(self, jump: float) -> tuple[float, float]:
+        """The whole turns and the counter that may have jumped so far; 0 where there is none."""
+        return math.tau * round(jump / math.tau), self._counter(jump)
 
     def _counter(self, jump: float) -> float:
         """How far a counter of 2ᵏ counts reaches that may have jumped so far [rad]; 0 where there is none."""
@@ -176,11 +187,13 @@ class Rotation:
         moved = psi - self.psi
         turned = angle - self._raw
         lost = moved - turned
-        if abs(lost) > math.pi:
+        if abs(lost) > LEAST_WIDTH:
             within = max(abs(angle), abs(self._raw)) <= math.tau + self.pitch
-            self._wraps = within and abs(lost) < 1.5 * math.tau
+            self._wraps = within and abs(math.remainder(lost, math.tau)) < 1e-6
             if not self._wraps:
                 self.rollovers += 1
+                fits = (width for width in self._widths(abs(lost)) if abs(abs(lost) - width) < 1e-6)
+                self._width = next(fits, math.nan)
                 steps = lost / self.pitch
                 if math.isnan(tolerance.rollover) and abs(steps - round(steps)) > 1e-3:
                     self.is_zero_known &= abs(self._first) <= 0.5 * abs(lost)

@@ -506,19 +506,46 @@ def counted(samples: list[JointSample], per_turn: int, low: int, width: int, zer
         pytest.param(1000, -(2**11), 2**12, False, id='12 bit, signed'),
         pytest.param(1000, 0, 2**12, True, id='12 bit, unsigned, told'),
         pytest.param(4096, 0, 8 * 4096, False, id='eight turns'),
+        pytest.param(1000, -(2**9), 2**10, False, id='10 bit, little more than a turn'),
+        pytest.param(1000, 0, 2**10, True, id='10 bit, told'),
+        pytest.param(4000, -(2**11), 2**12, False, id='12 bit, little more than a turn'),
+        pytest.param(20_000, 0, 2**16, True, id='uint16, three turns and a quarter, told'),
+        pytest.param(360, -(2**7), 2**8, False, id='8 bit, less than a turn'),
+        pytest.param(1000, 0, 10_000, True, id='decades, told'),
     ],
 )
 def test_a_counter_that_rolls_over_loses_nothing(
     per_turn: int, low: int, width: int, rollover: bool, rates: bool
 ) -> None:
     samples = walk(16.0).samples(rates=rates)
-    zero = low + width - round(1.3 * per_turn)  # each wheel rolls over after some turns
+    zero = low + max(width - round(1.3 * per_turn), round(0.75 * width))  # each wheel rolls over after some time
     params = PhaseParams(rollover=width / per_turn * math.tau) if rollover else PARAMS
-    phases, falls, status = run(counted(samples, per_turn, low, width, zero), params)
+    counts = counted(samples, per_turn, low, width, zero)
+    phases, falls, status = run(counts, params)
+    moved = np.diff([(sample.front.angle, sample.rear.angle) for sample in counts], axis=0)
     below = width if rollover else 0  # told, a start in the upper half of the counter is one below 0
     plain, plain_falls, _ = run(counted(samples, per_turn, -(2**40), 2**41, zero - below))
-    assert status.rollovers == 2
+    assert status.rollovers == np.count_nonzero(np.abs(moved) > 0.5 * width / per_turn * math.tau) >= 2
     assert (status.restarts, status.refusals, status.n_uncertain) == (0, {}, False)
+    assert [phase.phi.angle for phase in phases] == pytest.approx([p.phi.angle for p in plain], abs=1e-2)
+    assert [(fall.wheel, fall.steps) for fall in falls] == [(fall.wheel, fall.steps) for fall in plain_falls]
+
+
+def test_a_counter_of_unknown_width_asks_for_the_parameter_that_makes_it_good() -> None:
+    samples = counted(walk(16.0).samples(), 4096, -2000, 6000)  # no power of two, nor whole turns, nor both ends alike
+    assert run(samples)[2].hints == ('lone_jump',)
+    assert run(samples, PhaseParams(rollover=6000 / 4096 * math.tau))[2].restarts == 0
+
+
+def test_a_wheel_that_rocks_where_its_counter_rolls_over_loses_nothing() -> None:
+    """A counter of 1024 counts and 1000 a turn, which is at its top as the wheels turn back and forth."""
+    time = np.arange(0.0, 12.0, 0.005)
+    angle = np.where(time < 4.0, 0.8 * time, 3.2 + 0.2 * np.sin(4.0 * (time - 4.0)))
+    samples = [JointSample(START_NS + round(t * 1e9), Turn(a), Turn(a - 0.2)) for t, a in zip(time, angle, strict=True)]
+    phases, falls, status = run(counted(samples, 1000, -512, 1024))
+    plain, plain_falls, _ = run(counted(samples, 1000, -(2**40), 2**41))
+    assert status.rollovers > 4
+    assert (status.restarts, status.hints) == (0, ())
     assert [phase.phi.angle for phase in phases] == pytest.approx([p.phi.angle for p in plain], abs=1e-2)
     assert [(fall.wheel, fall.steps) for fall in falls] == [(fall.wheel, fall.steps) for fall in plain_falls]
 
