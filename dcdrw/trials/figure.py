@@ -17,6 +17,8 @@ from dcdrw_sim.figures.style import BAND, BLACK, COLUMN, WHEELS, for_print, new_
 
 SCREEN = 9.0
 """Width on a screen [inch]; on a printed page its letters are of POINTS still."""
+CLOSE = 50
+"""Steps from which on lines and marks are drawn finer, so that they do not run into one another."""
 LETTERS = 15
 """Letters of POINTS that an inch of a title's line holds."""
 _FORCE = '#555555'
@@ -99,6 +101,11 @@ class _Course(NamedTuple):
         return math.degrees(self.trial.pitch)
 
     @property
+    def fine(self) -> float:
+        """What lines and marks of steps are scaled by."""
+        return min(1.0, max(CLOSE / max(self.trial.status.steps, 1), 0.2))
+
+    @property
     def person(self) -> bool:
         """Whether a person walks in the place of the front wheel."""
         return self.trial.params.simulator.person.walks
@@ -129,7 +136,9 @@ def _shade_gaps(axes: Any, course: _Course) -> None:
 
 
 def _legend(axes: Any) -> None:
-    axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=4, frameon=False, borderaxespad=0.1)
+    legend = axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=4, frameon=False, borderaxespad=0.1)
+    for line in legend.get_lines():
+        line.set_linewidth(1.3)
 
 
 def _draw_angles(axes: Any, course: _Course) -> None:
@@ -139,7 +148,7 @@ def _draw_angles(axes: Any, course: _Course) -> None:
             *course.line(np.degrees(theta), course.step / 2),  # a strike is a jump, not a motion
             color=WHEELS[wheel],
             label=name,
-            linewidth=1.3,
+            linewidth=1.3 * course.fine,
             linestyle='-' if wheel == FRONT else '--',
         )
     if len(course.pieces) > 1:
@@ -161,7 +170,7 @@ def _draw_phase(axes: Any, course: _Course) -> None:
         label=f'±{params.band_percent:g} % of 50 %',
     )
     axes.axhline(step / 2, color=BAND, linewidth=1)
-    axes.plot(*course.line(np.degrees(course.motion.phi), step / 2), color=BLACK, linewidth=1.3, label='φ')
+    axes.plot(*course.line(np.degrees(course.motion.phi), step / 2), color=BLACK, linewidth=1.3 * course.fine, label='φ')
     entered = course.trial.status.steps_to_synchronization
     for second in [second for second, steps in course.falls(FRONT) if steps == entered][-1:]:
         axes.axvline(second, color=BAND, linestyle=':', linewidth=1.5, label=f'from step {entered} on')
@@ -189,7 +198,7 @@ def _draw_gait(axes: Any, course: _Course) -> None:
             [row + 0.42] * len(falls),
             'v',
             color=WHEELS[wheel],
-            markersize=4,
+            markersize=4 * course.fine,
             clip_on=False,
         )
     axes.set_yticks((0, 1), (REAR, FRONT))
@@ -232,11 +241,14 @@ def _draw_force(axes: Any, course: _Course) -> None:
     axes.axhline(0.0, color='0.85', zorder=0, linewidth=0.8)
     if not course.person:
         axes.set_ylabel('coupler force [N]')
-        axes.plot(*course.line(force), color=_FORCE, linewidth=1.0)
+        axes.plot(*course.line(force), color=_FORCE, linewidth=course.fine)
         return
     peak, rms = np.nanmax(np.abs(force)), math.sqrt(np.nanmean(force**2))
     axes.set_ylabel('on the person [N]')  # tension pulls back
     axes.plot(
-        *course.line(-force), color=_FORCE, linewidth=1.0, label=f'at most {peak:.1f} N, {rms:.1f} N rms, + forward'
+        *course.line(-force),
+        color=_FORCE,
+        linewidth=course.fine,
+        label=f'at most {peak:.1f} N, {rms:.1f} N rms, + forward',
     )
     _legend(axes)
