@@ -230,6 +230,7 @@ class Bar:
                 TextColumn('{task.fields[pace]}'),
                 TimeRemainingColumn(),
                 console=Console(stderr=True),
+                transient=True,
             )
             self._progress.start()
             self._task = self._progress.add_task(self._what, total=None, pace='')

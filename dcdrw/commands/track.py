@@ -118,6 +118,7 @@ def _finish(
     if film.complaint:
         print(f'dcdrw track: {film.complaint}; what came before is kept', file=sys.stderr)
     if film.interrupted:
+        print('dcdrw track: interrupted; what came before is kept', file=sys.stderr)
         return interrupted_status(film.interrupted)
     whole = summary.complete and not film.complaint
     return expectation_status(options.expect, [trial.state]) if whole else 1

@@ -173,7 +173,7 @@ _STYLES = {
 
 
 class _Screen(LiveLine):
-    """The live line of a trial; where there is no terminal, a line each second."""
+    """The live line of a trial, what matters most first; where there is no terminal, a line each second."""
 
     def __init__(self, quiet: bool) -> None:
         super().__init__(quiet)
@@ -192,9 +192,9 @@ class _Screen(LiveLine):
         status, strikes = observer.monitor.status(), observer.strikes
         state = observer.state or PairState.NO_DATA
         self.say(
-            f'{observer.seconds:5.1f} s  phase {phase_text(status.phase)}  '
-            f'error {status.error_percent:+5.1f} %  n {status.step_difference:+d}  '
-            f'strikes {strikes[FRONT]} + {strikes[REAR]}  {state.word}',
+            f'{observer.seconds:5.1f} s  {state.word:<12}  error {status.error_percent:+5.1f} %  '
+            f'phase {phase_text(status.phase)}  strikes {strikes[FRONT]} + {strikes[REAR]}  '
+            f'n {status.step_difference:+d}',
             _STYLES.get(state, ''),
         )
 
@@ -223,5 +223,6 @@ def _finish(course: Course, folder: Path, options: argparse.Namespace) -> int:
     if failure:
         print(f'dcdrw trial: {failure}', file=sys.stderr)
     if course.interrupted:
+        print('dcdrw trial: interrupted; what came before is kept', file=sys.stderr)
         return interrupted_status(course.interrupted)
     return expectation_status(options.expect, [trial.state]) if summary.complete and not failure else 1

@@ -1,6 +1,7 @@
 """A verdict that is expected, and the exit status where another one comes."""
 
 import argparse
+import sys
 from collections.abc import Iterable
 
 from dcdrw_msgs_py.diagnosis import PairState
@@ -20,5 +21,8 @@ def add_expect(parser: argparse.ArgumentParser) -> None:
 
 
 def expectation_status(expected: str | None, states: Iterable[PairState]) -> int:
-    """The exit status of trials that ended in these states."""
-    return 0 if expected is None or all(state == expected for state in states) else UNEXPECTED
+    """The exit status of trials that ended in these states; others than the expected one are told."""
+    others = [] if expected is None else [state.value for state in states if state != expected]
+    if others:
+        print(f'expected {expected}, got {", ".join(others)}', file=sys.stderr)
+    return UNEXPECTED if others else 0

@@ -20,6 +20,11 @@ def test_the_status_is_good_where_every_trial_ends_as_expected(expected):
         assert expectation_status(None, [other]) == 0
 
 
+def test_what_came_in_its_place_is_told(capsys):
+    expectation_status('stalled', [PairState.STALLED, PairState.SYNCHRONIZED])
+    assert capsys.readouterr().err == 'expected stalled, got synchronized\n'
+
+
 def test_the_status_is_no_other_commands():
     assert UNEXPECTED not in (0, 1, 2)
 
