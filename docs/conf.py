@@ -11,7 +11,6 @@ extensions = [
     'myst_parser',
     'sphinx.ext.autodoc',
     'sphinx.ext.autosummary',
-    'sphinxcontrib.mermaid',
 ]
 rosdoc2_settings = {'allow_other_extensions': True}
 templates_path = ['_templates']
@@ -22,7 +21,6 @@ html_theme_options = {'navigation_depth': 3}
 html_show_sourcelink = False
 
 myst_heading_anchors = 4
-myst_fence_as_directive = ['mermaid']
 default_role = 'code'
 autodoc_member_order = 'bysource'
 suppress_warnings = ['ref.python']  # a type such as `type` is a field of several classes, too

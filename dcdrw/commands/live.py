@@ -9,12 +9,13 @@ import socket
 import sys
 import tempfile
 import webbrowser
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
-from dcdrw.console import domain, interrupted_status, interruptible, need
+from dcdrw.console import domain, in_words, interrupted_status, interruptible, need
 from dcdrw.page.live_state import FRAMES_KEPT, Command, read_command
 from dcdrw.suite.executables import RECORDER, TRIAL
 from dcdrw.suite.parameter_file import TrialParams, add_rig_options, chosen_params, write_parameter_file
@@ -49,7 +50,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--host', default='127.0.0.1', metavar='ADDRESS', help='to serve at (default: %(default)s)')
     parser.add_argument('--token', help=f'what browsers must know; {AUTO}: make one up')
     parser.add_argument(
-        '--over', type=Path, metavar='RECORDING', help='draw an earlier trial of the rig beneath the live one'
+        '--over',
+        type=Path,
+        nargs='+',
+        default=[],
+        metavar='RECORDING',
+        help='draw an earlier trial of the rig beneath the live one; of several, that which is chosen on the page',
     )
     parser.add_argument(
         '--allow-enable',
@@ -71,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f'--token must have at least {SHORTEST_TOKEN} characters; {AUTO} makes one up')
     if not token and not is_loopback(options.host):
         raise ValueError(f'{options.host} is open to others: give a --token, or --token {AUTO}')
-    over = overlay(read_trial(options.over)[0], options.over.resolve().name) if options.over else None
+    over = list(_overlays(options.over))
     with ExitStack() as stack:
         stopped = stack.enter_context(interruptible())
         listener = stack.enter_context(listen_at(options.host, options.port))
@@ -97,6 +103,17 @@ def run(options: argparse.Namespace) -> int:
                 print(f'dcdrw live: {dead.failure}', file=sys.stderr, flush=True)
                 nodes.remove(dead)
     return 0
+
+
+def _overlays(recordings: Sequence[Path]) -> Iterator[dict[str, Any]]:
+    """Earlier trials; of several, one that cannot be read, or was not run, is left out."""
+    for path in recordings:
+        try:
+            yield overlay(read_trial(path)[0], path.resolve().name)
+        except (ValueError, OSError) as error:
+            if len(recordings) == 1:
+                raise
+            print(f'dcdrw live: left out: {in_words(error)}', file=sys.stderr)
 
 
 def _listener(

@@ -21,7 +21,7 @@ const SIGNS = {
 const element = (id) => document.getElementById(id);
 let socket = null, wait = FIRST_WAIT_MS, timer = 0, heardAt = -Infinity, scheduled = 0;
 let kept, frame, frameAt, board, run;
-let over = null;  // an earlier trial, drawn beneath the live one
+let over = null;  // the earlier trial that is drawn beneath the live one
 
 function forget() {
   kept = { phis: [], forces: [], falls: [] };
@@ -110,11 +110,19 @@ function draw() {
 
 const sameWheels = () => over && frame && board && JSON.stringify(over.wheels) === JSON.stringify(board.wheels);
 
-// Which earlier trial lies beneath, or why it does not.
+// Whether the earlier trial lies beneath, or why it does not.
 function showOver() {
-  if (!over || !board) return;
-  const told = !sameWheels() ? 'is of other wheels' : frame.start === null ? 'waits for the start of a trial' : 'beneath';
-  element('over').textContent = `– ${over.name} ${told}`;
+  element('over').textContent = !over || !board ? ''
+    : !sameWheels() ? 'is of other wheels' : frame.start === null ? 'waits for the start of a trial' : 'lies beneath';
+}
+
+function offerOvers(trials) {
+  const choice = element('choice');
+  choice.replaceChildren(new Option('no earlier trial', -1), ...trials.map(({ name }, k) => new Option(name, k)));
+  choice.onchange = () => { over = trials[choice.value] || null; schedule(); };
+  choice.value = trials.length ? 0 : -1;
+  choice.onchange();
+  element('beneath').hidden = !trials.length;
 }
 
 // The state, its age and what may be done, from the last frame or from its absence.
@@ -192,7 +200,7 @@ function showNodes(nodes) {
 }
 
 forget();
-fetch('over.json').then((answer) => answer.json()).then((trial) => { over = trial; schedule(); });
+fetch('over.json').then((answer) => answer.json()).then(offerOvers);
 setUpControls((command) => {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command));
 });

@@ -15,7 +15,7 @@ import socket
 import threading
 import time
 from collections import deque
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
@@ -81,7 +81,7 @@ class PageServer:
         token: what a browser must know; empty: nothing, but it must be on this machine.
         kept: frames kept for browsers that come.
         on_command: told each message of a browser, in the server's thread; raises ValueError where it is none.
-        over: an earlier trial to be drawn beneath the live one, as `dcdrw.trials.overlay` makes it.
+        over: earlier trials, one of which is drawn beneath the live one, as `dcdrw.trials.overlay` makes them.
 
     """
 
@@ -91,14 +91,14 @@ class PageServer:
         token: str,
         kept: int,
         on_command: Callable[[str], None],
-        over: dict[str, Any] | None = None,
+        over: Sequence[dict[str, Any]] = (),
     ) -> None:
         self._listener, self._token, self._on_command = listener, token, on_command
         self._cookie = _COOKIE.format(port=listener.getsockname()[1])
         self._known: set[Any] = set()
         """Connections over which a whole request has come."""
         self._files = {path: ((PAGE / name).read_bytes(), kind) for path, (name, kind) in _FILES.items()}
-        self._files['/over.json'] = (_json(over).encode(), 'application/json')
+        self._files['/over.json'] = (_json(list(over)).encode(), 'application/json')
         self._frames: deque[str] = deque(maxlen=kept)
         self._fresh_at = -math.inf
         self._count = 0

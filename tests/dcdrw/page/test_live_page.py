@@ -114,7 +114,7 @@ def test_what_is_drawn_follows_the_data(bench, live, chromium, live_trial):
     phases, joints, verdicts = bench.hear(PHASE_STATE), bench.hear(JOINT_STATES), bench.hear(VERDICT)
     start_nodes(bench)
     token = 'known-to-this-browser'
-    address = live.start('--token', token, '--over', str(live_trial))
+    address = live.start('--token', token, '--over', str(live_trial), str(live_trial))
     tab = chromium.tab(address)
     assert tab.value('location.search') == '', 'the token is no longer in the address'
     # The topics are found one after the other; without the coupler's length the feet are the footfalls' guess.
@@ -147,6 +147,12 @@ def test_what_is_drawn_follows_the_data(bench, live, chromium, live_trial):
     tab.wait("document.getElementById('phi-canvas').dataset.points > 100")
     tab.value("document.getElementById('reset').click()")  # a new start, beneath which the earlier trial lies
     tab.wait("document.getElementById('over').textContent.endsWith('beneath')")
+    tab.wait("document.getElementById('phi-canvas').dataset.over > 10")
+    assert text(tab, 'choice') == 'no earlier trial' + 2 * live_trial.name
+    choose = "document.getElementById('choice').value = {}; document.getElementById('choice').onchange()"
+    tab.value(choose.format(-1))
+    tab.wait("document.getElementById('phi-canvas').dataset.over == 0")
+    tab.value(choose.format(1))
     tab.wait("document.getElementById('phi-canvas').dataset.over > 10")
     assert tab.complaints == []
     assert live.end() == 0
