@@ -170,7 +170,9 @@ def _draw_phase(axes: Any, course: _Course) -> None:
         label=f'±{params.band_percent:g} % of 50 %',
     )
     axes.axhline(step / 2, color=BAND, linewidth=1)
-    axes.plot(*course.line(np.degrees(course.motion.phi), step / 2), color=BLACK, linewidth=1.3 * course.fine, label='φ')
+    axes.plot(
+        *course.line(np.degrees(course.motion.phi), step / 2), color=BLACK, linewidth=1.3 * course.fine, label='φ'
+    )
     entered = course.trial.status.steps_to_synchronization
     for second in [second for second, steps in course.falls(FRONT) if steps == entered][-1:]:
         axes.axvline(second, color=BAND, linestyle=':', linewidth=1.5, label=f'from step {entered} on')
