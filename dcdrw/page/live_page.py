@@ -226,7 +226,7 @@ class PageServer:
         return f'{{"age":{age:.3f},"frames":[{",".join(frames)}]}}'
 
 
-def _json(content: dict[str, Any] | None) -> str:
+def _json(content: object) -> str:
     return json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(',', ':'))
 
 
