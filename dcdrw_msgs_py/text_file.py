@@ -11,6 +11,11 @@ LARGEST_TABLE = 256 * 2**20
 """A larger table is none of ours [bytes]."""
 
 
+def one_line(text: object) -> str:
+    """A stranger's name for a message: what would break the line, or command a terminal, as an escape."""
+    return ''.join(c if c.isprintable() else c.encode('unicode_escape').decode() for c in str(text))
+
+
 def read_text(path: Path, largest: int = LARGEST_TEXT) -> str:
     """The content of a text file in UTF-8.
 

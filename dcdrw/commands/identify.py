@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
         new_figure(1, 1, 'the figure of an identification')
         files = [options.out / RIG, options.out / RESULT, *figure_files(options.out, [FIGURE], options.formats)]
         refuse_existing(files, options.force)
-    rig = read_parameter_file(options.rig, TrialParams.of_rig(PRESETS['paper'].rig)).rig
+    rig = read_parameter_file(options.rig, TrialParams.of_rig(PRESETS['paper'].rig), options.namespace).rig
     known = knowledge(rig, options.fix, read_uncertainty(options.rig), str(options.rig))
     if not known.unknowns:
         raise ValueError('everything is fixed: there is nothing to identify')

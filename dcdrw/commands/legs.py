@@ -33,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--rate', type=positive, default=math.nan, metavar='HZ', help='of a .csv that does not tell its times'
     )
     parser.add_argument('--rig', type=Path, metavar='FILE.yaml', help='parameters of leg_tracker that differ')
+    parser.add_argument('--namespace', default='', metavar='NS', help='of the suite, where several were recorded')
     parser.add_argument('--out', type=Path, metavar='DIR', help='write the results here')
     add_json(parser)
     add_force(parser)
@@ -44,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
     check_json(options)
     if folder and not options.force:
         free_folder(folder)
-    walk, damage = read_walk(options.file, options.rate, options.rig)
+    walk, damage = read_walk(options.file, options.rate, options.rig, options.namespace)
     for text in damage:
         print(f'dcdrw legs: {text}', file=sys.stderr)
     summary = summarize_walk(walk)

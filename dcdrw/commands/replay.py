@@ -2,9 +2,13 @@
 
 import argparse
 import math
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from dcdrw.console import LiveLine, need, number, positive
+from dcdrw.recordings.bag_file import Message
+from dcdrw.recordings.derived_joints import as_messages, derived_joints
+from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw_msgs_py.topics import COUPLER, FRONT_WHEEL, JOINT_STATES, REAR_WHEEL
@@ -65,15 +69,15 @@ def run(options: argparse.Namespace) -> int:
     from dcdrw_msgs_py.node import run as run_node
     from dcdrw_msgs_py.node import steady_clock
 
-    names = _names(options.rig)
     with Recording(options.recording) as recording:
-        topic = recording.find(options.topic, namespace=options.namespace)
+        topic, joints = _joints(options, recording)
+        names = _names(options.rig, topic.rpartition('/')[0])
         part = Part(*_window(options, recording), options.rate, options.loop)
         node: ReplayNode | None = None
 
         def make() -> ReplayNode:
             nonlocal node
-            node = ReplayNode(recording, topic, part, names)
+            node = ReplayNode(recording, topic, joints, part, names)
             node.create_timer(0.1, show, clock=steady_clock())
             return node
 
@@ -103,10 +107,25 @@ def _window(options: argparse.Namespace, recording: Recording) -> tuple[int, int
     return recording.start_ns + round(options.begin * 1e9), end_ns
 
 
-def _names(rig: Path | None) -> dict[str, str]:
+def _joints(options: argparse.Namespace, recording: Recording) -> tuple[str, Callable[[int, int], Iterator[Message]]]:
+    """The topic of the joint states, and what gives those that were recorded from one time to before another."""
+
+    def derived(*window: int) -> tuple[str, Iterator[JointBatch]] | None:
+        return derived_joints(recording, options.topic, options.rig, options.namespace, window)
+
+    def messages(begin_ns: int, end_ns: int) -> Iterator[Message]:
+        made = derived(begin_ns, end_ns)
+        return as_messages(*made, begin_ns) if made else recording.messages([topic], begin_ns, end_ns)
+
+    made = derived()
+    topic = made[0] if made else recording.find(options.topic, namespace=options.namespace)
+    return topic, messages
+
+
+def _names(rig: Path | None, namespace: str) -> dict[str, str]:
     """The names that are to change, and what to."""
     if rig is None:
         return {}
-    joints = read_parameter_file(rig, TrialParams()).phase
+    joints = read_parameter_file(rig, TrialParams(), namespace).phase
     pairs = ((joints.front_joint, FRONT_WHEEL), (joints.rear_joint, REAR_WHEEL), (joints.coupler_joint, COUPLER))
     return {recorded: name for recorded, name in pairs if recorded != name}

@@ -2,7 +2,7 @@
 
 import struct
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from rclpy.duration import Duration
@@ -47,9 +47,17 @@ class ReplayNode(Node):
     back or jump, the recorder's log tells the time.
     """
 
-    def __init__(self, recording: Recording, topic: str, part: Part, names: Mapping[str, str], **kwargs: Any) -> None:
+    def __init__(
+        self,
+        recording: Recording,
+        topic: str,
+        joints: Callable[[int, int], Iterator[Message]],
+        part: Part,
+        names: Mapping[str, str],
+        **kwargs: Any,
+    ) -> None:
         super().__init__('replay', **kwargs)
-        self._recording, self._topic, self._part, self._names = recording, topic, part, names
+        self._recording, self._joint_messages, self._part, self._names = recording, joints, part, names
         self._joints = advertise(self, JOINT_STATES)
         self._clock = advertise(self, CLOCK)
         self._runs = advertise(self, RUNS)
@@ -72,7 +80,7 @@ class ReplayNode(Node):
 
     def _begin(self) -> None:
         part = self._part
-        self._messages = self._recording.messages([self._topic], part.begin_ns, part.end_ns)
+        self._messages = self._joint_messages(part.begin_ns, part.end_ns)
         self._announced = list(self._recording.messages([self._runs_topic])) if self._runs_topic else []
         self._next = next(self._messages, None)
         self._next_ns = _stamp_ns(self._next) if self._next else 0

@@ -43,7 +43,7 @@ def record_joints(
     write_changed(None, values, folder / PARAMETERS, 'What the joint states were made with.')
     recorder.add_topic(TOPIC, JOINT_STATES.type, [offered_qos(True, False, JOINT_STATES.depth)])
     recorder.add_topic(RUNS_TOPIC, RUNS.type, [offered_qos(True, True, RUNS.depth)])
-    serialize, announce = _serializers(names)
+    serialize, announce = serializers(names)
     run = 0
     for sample in samples:
         if sample.run != run:
@@ -53,8 +53,8 @@ def record_joints(
     recorder.close()
 
 
-def _serializers(names: PhaseParams) -> tuple[Any, Any]:
-    """A joint state's bytes, and those of the run that it begins."""
+def serializers(names: PhaseParams) -> tuple[Any, Any]:
+    """What makes a joint state's bytes, and those of the run that it begins."""
     from rosbags.typesys import Stores, get_typestore
 
     types = get_typestore(Stores.ROS2_JAZZY)

@@ -1,13 +1,13 @@
 """Sensors on legs in a recording: as readings, and as the joint states that the leg tracker makes of them. No ROS."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import groupby
+from itertools import groupby, islice
 from typing import Any
 
 import numpy as np
 
 from dcdrw.recordings.joint_batch import JointBatch
-from dcdrw.recordings.recording import Recording
+from dcdrw.recordings.recording import BATCH, Recording
 from dcdrw_control.legs.conversion import READERS, hip_readings
 from dcdrw_control.legs.samples import Leg, LegReading, LegUpdate
 from dcdrw_msgs_py.samples import SECOND, Turn
@@ -16,20 +16,20 @@ from dcdrw_msgs_py.topics import LEG_JOINT_STATES, LEG_SENSORS, Topic
 _TOPICS = (*LEG_SENSORS.values(), LEG_JOINT_STATES)
 
 
-def find_topic(recording: Recording, topic: Topic) -> str | None:
-    """The topic's name in a recording, in whatever namespace; None where it has none.
+def find_topic(recording: Recording, topic: Topic, namespace: str = '') -> str | None:
+    """The topic's name in a recording, in this namespace or in whatever one; None where it has none.
 
     Raises:
         ValueError: it has one in several namespaces.
 
     """
-    there = (its == topic.type and f'/{name}'.endswith(f'/{topic.name}') for name, its in recording.types.items())
-    return recording.find(topic.name, topic.type) if any(there) else None
+    there = recording.found(topic.name, topic.type, namespace)
+    return recording.find(topic.name, topic.type, namespace) if there else None
 
 
-def leg_topics(recording: Recording) -> list[str]:
-    """The topics of sensors on legs that a recording has, in whatever namespace."""
-    return [name for topic in _TOPICS if (name := find_topic(recording, topic))]
+def leg_topics(recording: Recording, namespace: str = '') -> list[str]:
+    """The topics of sensors on legs that a recording has, in this namespace or in whatever one."""
+    return [name for topic in _TOPICS if (name := find_topic(recording, topic, namespace))]
 
 
 def namespace_of(name: str) -> str:
@@ -38,16 +38,20 @@ def namespace_of(name: str) -> str:
     return name.removesuffix(next(ends))
 
 
-def leg_readings(recording: Recording, hips: Sequence[str]) -> Iterator[LegReading]:
+def leg_readings(
+    recording: Recording, hips: Sequence[str], namespace: str = '', window: tuple[int, ...] = ()
+) -> Iterator[LegReading]:
     """The readings of all sensors on legs, in the order in which they were recorded.
 
     Args:
         recording: an open recording.
         hips: names of the hips in leg_joint_states, in the order of LEGS.
+        namespace: of the sensors, where the recording has several.
+        window: from when to before when they were recorded [ns].
 
     """
-    sensors = {find_topic(recording, topic): key for key, topic in LEG_SENSORS.items()}
-    for topic, log_ns, message in recording.decoded(leg_topics(recording)):
+    sensors = {find_topic(recording, topic, namespace): key for key, topic in LEG_SENSORS.items()}
+    for topic, log_ns, message in recording.decoded(leg_topics(recording, namespace), *window):
         # A Bool has no stamp of its own: it is of the time of its arrival, as for the node.
         stamp_ns = _stamp_ns(message.header.stamp) if hasattr(message, 'header') else log_ns
         if topic in sensors:
@@ -63,10 +67,10 @@ def leg_readings(recording: Recording, hips: Sequence[str]) -> Iterator[LegReadi
 def wheel_batches(updates: Iterable[LegUpdate]) -> Iterator[JointBatch]:
     """What the leg tracker found, as the joint states that it publishes."""
     for names, group in groupby((update for update in updates if update.wheels), lambda update: tuple(update.wheels)):
-        part = list(group)
-        turns = np.array([[update.wheels[name] for name in names] for update in part]).reshape(-1, len(names), 2)
-        stamps = np.array([update.stamp_ns for update in part], np.int64)
-        yield JointBatch('', names, stamps, turns[..., 0], turns[..., 1], np.full(turns.shape[:2], Turn().angle))
+        while part := list(islice(group, BATCH)):
+            turns = np.array([[update.wheels[name] for name in names] for update in part]).reshape(-1, len(names), 2)
+            stamps = np.array([update.stamp_ns for update in part], np.int64)
+            yield JointBatch('', names, stamps, turns[..., 0], turns[..., 1], np.full(turns.shape[:2], Turn().angle))
 
 
 def _stamp_ns(stamp: Any) -> int:

@@ -5,6 +5,7 @@ import numpy as np
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import JointSample, LoneWheel, Turn
+from dcdrw_msgs_py.text_file import one_line
 from dcdrw_tracker.gait.pairing import WheelPairs
 from dcdrw_tracker.gait.phase import PhaseParams
 
@@ -38,7 +39,7 @@ class LoneWheels:
         """Take a batch; returns the joint states that are complete, once there are enough."""
         name = next(name for name in self._names if name in batch.names)
         other = next(name for name in self._names if name not in batch.names)
-        self.missing = f'joint {other} is missing; the message names {", ".join(batch.names)}'
+        self.missing = f'joint {other} is missing; the message names {", ".join(map(one_line, batch.names))}'
         column = batch.names.index(name)
         rows = zip(batch.stamp_ns.tolist(), batch.position[:, column], batch.velocity[:, column], strict=True)
         times = batch.log_ns.tolist() or [0] * batch.messages

@@ -26,27 +26,32 @@ class PoseTracking(NamedTuple):
     bodies: PoseParams = PoseParams()
 
 
-def pose_topics(recording: Recording) -> list[str]:
+def pose_topics(recording: Recording, namespace: str = '') -> list[str]:
     """The topics of both wheels' poses, the front one's first; none unless both were recorded."""
-    names = [name for topic in (FRONT_POSE, REAR_POSE) if (name := find_topic(recording, topic))]
+    names = [name for topic in (FRONT_POSE, REAR_POSE) if (name := find_topic(recording, topic, namespace))]
     return names if len(names) == 2 else []
 
 
-def pose_batches(recording: Recording, rig: Path | None = None) -> Iterator[JointBatch]:
+def pose_batches(
+    recording: Recording, rig: Path | None = None, namespace: str = '', window: tuple[int, ...] = ()
+) -> Iterator[JointBatch]:
     """What the tag tracker makes of the poses, and those of no use, as messages that cannot be read.
 
     Args:
         recording: an open recording that has `pose_topics`.
         rig: a parameter file; it takes the place of what was recorded.
+        namespace: of the poses, where the recording has several.
+        window: from when to before when they were recorded [ns].
 
     Raises:
         ValueError, OSError: of the parameter files.
 
     """
     params = PoseTracking()
+    topics = pose_topics(recording, namespace)
     for file in filter(None, (recording.parameters, rig)):
-        params = read_parameter_file(file, params)
-    for kind, group in groupby(_followed(recording, params), _kind):
+        params = read_parameter_file(file, params, topics[0].removesuffix(FRONT_POSE.name))
+    for kind, group in groupby(_followed(recording, params, topics, window), _kind):
         while part := list(islice(group, BATCH)):
             yield _unread(kind, len(part)) if isinstance(kind, str) else _joints(part, kind)
 
@@ -56,11 +61,13 @@ def _kind(found: JointSample | str) -> int | str:
     return found if isinstance(found, str) else found.run
 
 
-def _followed(recording: Recording, params: PoseTracking) -> Iterator[JointSample | str]:
+def _followed(
+    recording: Recording, params: PoseTracking, topics: list[str], window: tuple[int, ...]
+) -> Iterator[JointSample | str]:
     """Joint states, and in the place of poses that are of no use why."""
     pairs, angles = PosePairs(params.bodies, params.track.slope), WheelAngles(params.track)
-    wheels = dict(zip(pose_topics(recording), (FRONT, REAR), strict=True))
-    for topic, _, message in recording.decoded(list(wheels)):
+    wheels = dict(zip(topics, (FRONT, REAR), strict=True))
+    for topic, _, message in recording.decoded(topics, *window):
         try:
             views = pairs.take(wheels[topic], _pose(message))
         except ValueError as error:

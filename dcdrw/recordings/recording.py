@@ -12,6 +12,7 @@ from dcdrw.recordings.bag_file import CDR, BagFile, Message, RecordedTopic
 from dcdrw.recordings.bag_folder import COMPRESSIONS, find_bag
 from dcdrw.recordings.joint_batch import JointBatch, decode_joints
 from dcdrw.recordings.recorder import PARAMETERS, require_libraries
+from dcdrw_msgs_py.text_file import one_line
 
 BATCH = 4096
 """Messages that are decoded at once."""
@@ -102,6 +103,15 @@ class Recording(AbstractContextManager['Recording']):
         """How many messages a topic has."""
         return sum(file.counts.get(topic, 0) for file in self._files)
 
+    def found(self, name: str, kind: str = JOINT_STATE, namespace: str = '') -> list[str]:
+        """The topics of this name, in this namespace, or in whatever one they are."""
+        end = '/'.join(('', *namespace.strip('/').split('/'), name.lstrip('/'))).replace('//', '/')
+        return [
+            topic
+            for topic, its in self.types.items()
+            if its == kind and (topic == name or (topic == end if namespace else topic.endswith(end)))
+        ]
+
     def find(self, name: str, kind: str = JOINT_STATE, namespace: str = '') -> str:
         """The topic of this name, in this namespace, or in whatever one there is.
 
@@ -109,20 +119,15 @@ class Recording(AbstractContextManager['Recording']):
             ValueError: there is none, or one in several namespaces.
 
         """
-        end = f'/{namespace}/{name}'.replace('//', '/') if namespace.strip('/') else f'/{name.lstrip("/")}'
-        found = [
-            topic
-            for topic, its in self.types.items()
-            if its == kind and (topic == name or (topic == end if namespace else topic.endswith(end)))
-        ]
+        found = self.found(name, kind, namespace)
         if len(found) == 1:
             return found[0]
         if found:
-            spaces = sorted(topic.removesuffix(end) or '/' for topic in found)
+            spaces = sorted(one_line(topic).removesuffix(f'/{name.lstrip("/")}') or '/' for topic in found)
             raise ValueError(
                 f'{self.path} has several suites with {name}: choose one with --namespace {" or ".join(spaces)}'
             )
-        others = ', '.join(topic for topic, its in self.types.items() if its == kind) or 'none'
+        others = ', '.join(one_line(topic) for topic, its in self.types.items() if its == kind) or 'none'
         raise ValueError(
             f'{self.path} has no topic {name} of {kind}{f" in {namespace}" if namespace else ""}; '
             f'of this type it has: {others}'
@@ -141,16 +146,18 @@ class Recording(AbstractContextManager['Recording']):
             while batch := list(islice(group, BATCH)):
                 yield from decode_joints([data for _, data in batch], [log_ns for log_ns, _ in batch])
 
-    def decoded(self, topics: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
+    def decoded(
+        self, topics: Sequence[str], start_ns: int = _FIRST, stop_ns: int = _LAST
+    ) -> Iterator[tuple[str, int, Any]]:
         """The messages of these topics as rosbags decodes them: topic, log time, message; damaged ones are left out."""
         from rosbags.typesys import Stores, get_typestore
 
         types = get_typestore(Stores.ROS2_JAZZY)
-        for topic, log_ns, data in self.messages(topics):
+        for topic, log_ns, data in self.messages(topics, start_ns, stop_ns):
             try:
                 message = types.deserialize_cdr(data, self.types[topic])
             except Exception:  # of any kind, for the content may be anything
-                text = f'{self.path}: messages of {topic} are malformed'
+                text = f'{self.path}: messages of {one_line(topic)} are malformed'
                 self._lost.extend([] if text in self._lost else [text])
                 continue
             yield topic, log_ns, message

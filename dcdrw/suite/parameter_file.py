@@ -12,6 +12,7 @@ from dcdrw.console import count, degrees, number
 from dcdrw.suite.executables import EXECUTABLES
 from dcdrw_msgs_py.quantity import Field, Quantity, build, fields, flatten, suggestion
 from dcdrw_msgs_py.rig import RigParams, WheelPitch, WheelShape
+from dcdrw_msgs_py.text_file import one_line
 from dcdrw_msgs_py.yaml_file import read_yaml, yaml_text
 from dcdrw_sim.identification.unknowns import Uncertainty, names_of_unknowns
 from dcdrw_sim.model.presets import PRESETS
@@ -20,6 +21,8 @@ from dcdrw_tracker.gait.phase import PhaseParams
 from dcdrw_tracker.gait.sync import SyncParams
 
 _EVERY_NODE = '/**'
+_EVERY = ('**', '*')
+"""In place of a node's name, or of a namespace: any, of as many names as may be, or of one."""
 _PARAMETERS = 'ros__parameters'
 _OF_ROS = ('use_sim_time',)
 _UNCERTAINTY = 'uncertainty'
@@ -68,15 +71,17 @@ def read_parameter_file(path: Path, base: Sets, namespace: str = '') -> Sets:
     """
     content = _read(path)
     _uncertainty(content, path)
-    sections = _sections(content, path, namespace)
+    sections = {section: _parameters(tree, section, path) for section, tree in content.items()}
+    space = _namespace(sections, path, namespace)
     kinds = {name: type(values) for name, values in zip(base._fields, base, strict=True)}  # type: ignore[attr-defined]
     all_names = {field.name for kind in _NODES_OF for field in fields(kind)}.union(_OF_ROS)
     sets: dict[str, Any] = {}
     for name, kind in kinds.items():
         mine = {field.name for field in fields(kind)}
         values: dict[str, Any] = {}
-        for node in (_EVERY_NODE, *_NODES_OF[kind]):
-            values |= sections.get(node, {})
+        for section, its in sections.items():
+            if any(_is_for(section, node, space) for node in _NODES_OF[kind]):
+                values |= its
         chosen = {key: value for key, value in values.items() if key in mine or key not in all_names}
         sets[name] = build(kind, flatten(getattr(base, name)) | chosen, str(path))
     return type(base)(**sets)
@@ -94,12 +99,29 @@ def read_uncertainty(path: Path) -> Uncertainty | None:
 
 def _read(path: Path) -> dict[str, Any]:
     content = read_yaml(path)
-    if not isinstance(content, dict) or not all(_is_section(section) for section in content.values()):
-        raise ValueError(
-            f'{path} is not a parameter file: it must have the form of config/rig.yaml, '
-            f'"{_EVERY_NODE}:", "{_PARAMETERS}:", then the parameters'
-        )
-    return content
+    sections: dict[str, Any] = {}
+    for name, tree in _nested(content):
+        if tree is None or name in sections:
+            raise ValueError(
+                f'{path} has {one_line(name)} twice'
+                if name in sections
+                else f'{path} is not a parameter file: it must have the form of config/rig.yaml, '
+                f'"{_EVERY_NODE}:", "{_PARAMETERS}:", then the parameters'
+            )
+        sections[name] = tree
+    return sections
+
+
+def _nested(content: Any, prefix: str = '') -> Iterator[tuple[str, Any]]:
+    """Sections by their names, also those within the namespaces of nodes; None where something else stands there."""
+    if not isinstance(content, dict) or not content:
+        yield prefix, None
+        return
+    for name, tree in content.items():
+        if _is_section(tree):
+            yield f'{prefix}{name}', tree
+        else:
+            yield from _nested(tree, f'{prefix}{name}/')
 
 
 def _uncertainty(content: Mapping[str, Any], path: Path) -> Uncertainty | None:
@@ -139,33 +161,57 @@ def _coerced(hint: Any, name: str, value: Any, where: str) -> Any:
         raise ValueError(f'{error} ({where})') from None
 
 
-def _sections(content: Mapping[str, Any], path: Path, namespace: str) -> dict[str, dict[str, Any]]:
-    """Parameters by node, whatever the namespace before its name, as long as it is one."""
-    known = (_EVERY_NODE, *_NODES)
-    places: list[tuple[str, str, str]] = []
-    for section in map(str, content):
+def _parameters(section: Mapping[str, Any], name: str, path: Path) -> dict[str, Any]:
+    """The parameters of a section, by dotted names."""
+    own: dict[str, Any] = {}
+    for key, value in _flatten(section[_PARAMETERS] or {}):
+        if key in own:
+            raise ValueError(f'{path} has {one_line(key)} twice (for {one_line(name)})')
+        own[key] = value
+    return own
+
+
+def _namespace(sections: Iterable[str], path: Path, namespace: str) -> str:
+    """The namespace whose parameters are read: the one asked for, or the only one that there is.
+
+    Raises:
+        ValueError: a section is of no node; there are several namespaces, and that asked for is none of them.
+
+    """
+    asked, spaces, is_there = namespace.strip('/'), set(), False
+    for section in sections:
         if section == _UNCERTAINTY:
             continue
-        space, _, node = ('', '', _EVERY_NODE) if section == _EVERY_NODE else section.rpartition('/')
-        if node not in known:
-            raise ValueError(f'{path} has parameters for {section}, which no trial has{suggestion(node, known)}')
-        places.append((section, space.strip('/').removeprefix('**'), node))
-    spaces = {space for _, space, _ in places if space}
-    chosen = {namespace.strip('/')} & spaces or spaces
-    if len(chosen) > 1:
-        raise ValueError(
-            f'{path} has parameters of several suites: choose one with --namespace {" or ".join(sorted(spaces))}'
-        )
-    found: dict[str, dict[str, Any]] = {}
-    for section, space, node in places:
-        own: dict[str, Any] = {}
-        for key, value in _flatten(content[section][_PARAMETERS] or {}):
-            if key in own:
-                raise ValueError(f'{path} has {key} twice (for {section})')
-            own[key] = value
-        if not space or space in chosen:
-            found.setdefault(node, {}).update(own)
-    return found
+        space, _, node = section.strip('/').rpartition('/')
+        if node not in (*_EVERY, *_NODES):
+            known = (_EVERY_NODE, *_NODES)
+            raise ValueError(
+                f'{path} has parameters for {one_line(section)}, which no trial has{suggestion(one_line(node), known)}'
+            )
+        if space and '*' not in space:
+            spaces.add(space)
+        if space:
+            is_there |= any(_is_for(section, name, asked) for name in _NODES)
+    if is_there or not spaces:
+        return asked
+    if len(spaces) > 1:
+        choice = ' or '.join(f'/{one_line(space)}' for space in sorted(spaces))
+        raise ValueError(f'{path} has parameters of several suites: choose one with --namespace {choice}')
+    return spaces.pop()
+
+
+def _is_for(section: str, node: str, namespace: str) -> bool:
+    """Whether a section is for a node, as ROS has it; a name without a namespace is here for that node in any."""
+    parts, names = section.strip('/').split('/'), [*filter(None, namespace.split('/')), node]
+    if parts == [node]:
+        return True
+    places = {0}  # in the node's name, up to which the section's may reach so far
+    for part in parts:
+        if part == '**':
+            places = set(range(min(places, default=len(names) + 1), len(names) + 1))
+        else:
+            places = {place + 1 for place in places if place < len(names) and part in ('*', names[place])}
+    return len(names) in places
 
 
 class RigOption(NamedTuple):
@@ -259,7 +305,7 @@ def write_changed(
         uncertainty: how well the rig is known now, in the place of what the file says.
 
     """
-    sections = read_yaml(source) if source else {}
+    sections = _read(source) if source else {}
     content = {
         section: {name: value for name, value in _flatten(tree[_PARAMETERS] or {}) if name not in changes}
         for section, tree in sections.items()

@@ -18,6 +18,7 @@ from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.rig import FRONT
 from dcdrw_msgs_py.rolling import phi_pitch
 from dcdrw_msgs_py.samples import SECOND, CouplerSample, Footfall, JointSample, PhaseSample, Turn
+from dcdrw_msgs_py.text_file import one_line
 from dcdrw_msgs_py.values import Floats
 from dcdrw_tracker.gait.cadence import CadenceStatus
 from dcdrw_tracker.gait.pair_state import judge
@@ -336,7 +337,7 @@ def _missing(names: Sequence[str], wheels: Sequence[str]) -> str:
             what = (
                 'stands twice in the message'
                 if name in names
-                else (f'is missing; the message names {", ".join(names) or "none"}')
+                else (f'is missing; the message names {", ".join(map(one_line, names)) or "none"}')
             )
             return f'joint {name} {what}'
     return ''

@@ -2,16 +2,16 @@
 
 import math
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from dcdrw.files import to_json, write_csv, write_text
-from dcdrw.recordings.leg_recording import leg_readings, leg_topics
+from dcdrw.recordings.derived_joints import WalkParams, recorded_walk
+from dcdrw.recordings.leg_recording import leg_readings
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.parameter_file import read_parameter_file
 from dcdrw_control.legs.csv_file import read_legs
-from dcdrw_control.legs.params import LegParams
 from dcdrw_control.legs.samples import LEGS, Leg
 from dcdrw_control.legs.walk import Walk, follow
 from dcdrw_msgs_py.topics import FRONT_WHEEL, REAR_WHEEL
@@ -20,19 +20,16 @@ PAUSE = 2.0
 """Strides that take this many times the median are pauses: they are left out of the mean."""
 
 
-class WalkParams(NamedTuple):
-    """The parameters of leg_tracker."""
-
-    legs: LegParams = LegParams()
-
-
-def read_walk(path: Path, rate: float = math.nan, rig: Path | None = None) -> tuple[Walk, list[str]]:
+def read_walk(
+    path: Path, rate: float = math.nan, rig: Path | None = None, namespace: str = ''
+) -> tuple[Walk, list[str]]:
     """Follow the legs in a CSV file, or in a recording of their sensors; tells what of it is damaged, and left out.
 
     Args:
         path: the file, or the recording.
         rate: of a CSV file that does not tell its times [Hz].
         rig: a parameter file; of a recording, it takes the place of what was recorded.
+        namespace: of the legs' sensors, where a recording has several.
 
     Raises:
         ValueError: what is in a file cannot be used; the mend is told.
@@ -40,21 +37,14 @@ def read_walk(path: Path, rate: float = math.nan, rig: Path | None = None) -> tu
 
     """
     if path.suffix.lower() == '.csv':
-        params = read_parameter_file(rig, WalkParams()) if rig else WalkParams()
+        params = read_parameter_file(rig, WalkParams(), namespace) if rig else WalkParams()
         return follow(read_legs(path, rate).readings, params.legs), []
     with Recording(path) as recording:
-        if not leg_topics(recording):
-            raise ValueError(f'{path} has no topic of a sensor on a leg, as front/left_imu')
-        walk = follow_recording(recording, rig)
-        return walk, recording.damage
-
-
-def follow_recording(recording: Recording, rig: Path | None = None) -> Walk:
-    """Follow the legs whose sensors were recorded, as the node would have done."""
-    params = WalkParams()
-    for file in filter(None, (recording.parameters, rig)):
-        params = read_parameter_file(file, params)
-    return follow(leg_readings(recording, params.legs.hip_joints), params.legs)
+        legs, topics = recorded_walk(recording, rig, namespace)
+        if not topics:
+            where = f' in {namespace}' if namespace else ''
+            raise ValueError(f'{path} has no topic of a sensor on a leg{where}, as front/left_imu')
+        return follow(leg_readings(recording, legs.hip_joints, namespace), legs), recording.damage
 
 
 def summarize_walk(walk: Walk) -> dict[str, dict[str, Any]]:

@@ -8,16 +8,14 @@ from typing import Any
 from dcdrw.console import Bar
 from dcdrw.drawings.figure_files import figure_files
 from dcdrw.files import Table, table_file, to_json, write_csv, write_text, write_whole
+from dcdrw.recordings.derived_joints import derived_joints
 from dcdrw.recordings.joint_batch import JointBatch
-from dcdrw.recordings.leg_recording import find_topic, leg_topics, namespace_of, wheel_batches
-from dcdrw.recordings.pose_recording import pose_batches, pose_topics
 from dcdrw.recordings.recorded_runs import recorded_runs, with_runs
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw.trials.agreement import Agreement, Comparison
 from dcdrw.trials.analysis import Analysis, analyze
 from dcdrw.trials.figure import draw_trial
-from dcdrw.trials.leg_walk import follow_recording
 from dcdrw.trials.motion import MotionTable, Sink
 from dcdrw.trials.summary import sentence, summarize
 from dcdrw_msgs_py.rolling import phi_pitch
@@ -59,7 +57,7 @@ def read_trial(
             if recording.parameters:
                 params = read_parameter_file(recording.parameters, params, space)
         if rig:
-            params = read_parameter_file(rig, params)
+            params = read_parameter_file(rig, params, space)
         comparison = Comparison(recording, phi_pitch(params.sync.front, params.sync.rear), space)
         trial = analyze(batches, params, [*sinks, comparison])
         if trial.unreadable and not len(trial.motion.stamp_ns):
@@ -92,7 +90,8 @@ class SampleTable:
 
     def begin(self) -> None:
         """Take back what came before the wheels were let go."""
-        self._do(lambda table: table.forget())
+        if self._table:
+            self._do(lambda table: table.forget())
 
     def finish(self) -> None:
         """Make the table also where there was no sample.
@@ -146,20 +145,12 @@ def _joint_states(
 
     Where only poses of the wheels or sensors on legs were recorded, what tag_tracker or leg_tracker makes of them.
     """
-    legs, poses = ([], []) if namespace else (leg_topics(recording), pose_topics(recording))
-    if not (legs or poses) or topic != JOINT_STATES.name or find_topic(recording, JOINT_STATES):
-        name = recording.find(topic, namespace=namespace)
-        batches = with_runs(recording.joints(name), recorded_runs(recording, name))
-        return name, _shown(batches, recording.count(name))
-    if poses:
-        return f'{poses[0].rpartition("/")[0]}/{topic}', pose_batches(recording, rig)
-    updates = follow_recording(recording, rig).updates
-    if not any(len(update.wheels) == 2 for update in updates):
-        raise ValueError(
-            f'{recording.path}: a trial needs both legs of both halves at one time, dcdrw legs only one leg; '
-            f'recorded are {", ".join(legs)}'
-        )
-    return f'{namespace_of(legs[0])}/{topic}', wheel_batches(updates)
+    derived = derived_joints(recording, topic, rig, namespace)
+    if derived:
+        return derived
+    name = recording.find(topic, namespace=namespace)
+    batches = with_runs(recording.joints(name), recorded_runs(recording, name))
+    return name, _shown(batches, recording.count(name))
 
 
 def _shown(batches: Iterator[JointBatch], total: int) -> Iterator[JointBatch]:

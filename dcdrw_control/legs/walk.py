@@ -1,7 +1,7 @@
 """What the leg tracker makes of readings that are at hand, as fast as it goes."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +33,11 @@ class Walk(NamedTuple):
         rows = [(u.stamp_ns / 1e9, u.legs[leg].angle / math.tau) for u in self.updates if leg in u.legs]
         seconds, strides = np.array(rows, float).reshape(-1, 2).T
         return seconds, strides
+
+
+def leg_updates(readings: Iterable[LegReading], params: LegParams | None = None) -> Iterator[LegUpdate]:
+    """What the leg tracker publishes of readings in the order of time, one after the other."""
+    return filter(None, map(LegTracker(params or LegParams()).update, readings))
 
 
 def follow(readings: Iterable[LegReading], params: LegParams | None = None) -> Walk:

@@ -16,6 +16,9 @@ from dcdrw_msgs_py.messages import stamp_ns
 from dcdrw_msgs_py.topics import CLOCK, FOOTFALLS, JOINT_STATES, PHASE_STATE
 from tests import ROOT
 from tests.bags import joint_state, write_bag
+from tests.dcdrw.recordings.test_pose_recording import pose_bag
+from tests.tracker.walking import walk
+from tests.tracker.wheels.test_poses import streams
 
 pytestmark = pytest.mark.processes
 
@@ -135,6 +138,17 @@ def test_loop_goes_on_until_it_is_interrupted(bench, renamed):
     finish(bench, process)
     assert process.returncode == 130
     assert [message.position[0] for message in joints[:120]] == [*range(50), *range(50), *range(20)]
+
+
+def test_poses_are_replayed_as_the_joint_states_that_they_tell(bench, tmp_path):
+    bag = pose_bag(tmp_path / 'bag', streams(walk(4.0, 120.0)))
+    joints = bench.hear(JOINT_STATES)
+    process = replay(bench, str(bag), '--from', '1', '--rate', '4', '--namespace', 'mocap')
+    assert 'joint states sent' in finish(bench, process)
+    assert process.returncode == 0
+    assert 340 < len(joints) < 361
+    assert joints[0].name == ['front_wheel', 'rear_wheel']
+    assert stamp_ns(joints[-1].header.stamp) - stamp_ns(joints[0].header.stamp) == pytest.approx(3e9, rel=0.05)
 
 
 @pytest.mark.parametrize(

@@ -41,6 +41,15 @@ def test_a_recorded_walk_is_analyzed_as_a_trial(tmp_path):
     assert len(trial.footfalls) == pytest.approx(2.0 * steps, abs=8.0)
 
 
+def test_a_walk_is_found_by_its_namespace(tmp_path, capsys):
+    walk = write_walk(tmp_path / 'walk', namespace='/xrl', seconds=8.0)
+    assert main(['analyze', str(walk), '--namespace', 'xrl']) == 0
+    capsys.readouterr()
+    for command in ('analyze', 'legs', 'replay'):
+        assert main([command, str(walk), '--namespace', '/lab']) == 2
+        assert 'in /lab' in capsys.readouterr().err
+
+
 def test_one_half_is_no_trial_and_the_message_says_so(tmp_path):
     walk = write_walk(tmp_path / 'walk', LEGS[:2])
     with pytest.raises(ValueError, match=r'both legs of both halves .* /front/left_wrench, /front/right_wrench'):

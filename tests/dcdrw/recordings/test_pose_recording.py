@@ -16,6 +16,11 @@ from tests.tracker.wheels.test_poses import streams, y_up
 
 def pose_bag(path, poses, namespace='/mocap'):
     """A recording of poses, as rosbag2 makes it."""
+    return pose_bags(path, {namespace: poses})
+
+
+def pose_bags(path, of):
+    """A recording of poses in several namespaces."""
     kind = {name: TYPES.types[name] for name in (FRONT_POSE.type, 'geometry_msgs/msg/Pose', 'std_msgs/msg/Header')}
     time, point, turn = (
         TYPES.types[name]
@@ -23,16 +28,17 @@ def pose_bag(path, poses, namespace='/mocap'):
     )
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         topics = {
-            wheel: writer.add_connection(f'{namespace}/{topic.name}', topic.type, typestore=TYPES)
+            (namespace, wheel): writer.add_connection(f'{namespace}/{topic.name}', topic.type, typestore=TYPES)
             for wheel, topic in (('front', FRONT_POSE), ('rear', REAR_POSE))
+            for namespace in of
         }
-        for wheel, pose in poses:
+        for namespace, wheel, pose in ((namespace, *one) for namespace, poses in of.items() for one in poses):
             message = kind[FRONT_POSE.type](
                 kind['std_msgs/msg/Header'](time(*divmod(pose.stamp_ns, 10**9)), 'room'),
                 kind['geometry_msgs/msg/Pose'](point(*pose.position), turn(*pose.orientation)),
             )
             log_ns = pose.stamp_ns or START_NS
-            writer.write(topics[wheel], log_ns, bytes(TYPES.serialize_cdr(message, FRONT_POSE.type)))
+            writer.write(topics[namespace, wheel], log_ns, bytes(TYPES.serialize_cdr(message, FRONT_POSE.type)))
     return path
 
 
@@ -80,3 +86,21 @@ def test_poses_of_no_use_are_counted_and_said(tmp_path, capsys):
     rig = tmp_path / 'rig.yaml'
     rig.write_text("tag_tracker:\n  ros__parameters:\n    up_axis: 'y'\n")
     assert main(['analyze', str(tmp_path / 'turned'), '--rig', str(rig)]) == 0
+
+
+def test_of_the_poses_of_two_rigs_those_asked_for_are_judged(tmp_path, capsys):
+    """One rig walks for 4 s, the other for 8."""
+    bag = pose_bags(tmp_path / 'bag', {'/rig_1': streams(walk(4.0, 120.0)), '/rig_2': streams(walk(8.0, 120.0))})
+    for command, out in (('analyze', []), ('report', ['--out', str(tmp_path / 'day.html')]), ('replay', [])):
+        assert main([command, str(bag), *out]) == 2
+        assert 'choose one with --namespace /rig_1 or /rig_2' in capsys.readouterr().err
+        assert main([command, str(bag), *out, '--namespace', 'rig_3']) == 2
+        assert 'in rig_3' in capsys.readouterr().err
+    for namespace, seconds in (('rig_1', 4.0), ('/rig_2/', 8.0)):
+        trial, _ = read_trial(bag, namespace=namespace)
+        assert trial.seconds == pytest.approx(seconds, abs=0.1)
+    rig = tmp_path / 'rig.yaml'
+    rig.write_text(
+        '/rig_1/**: {ros__parameters: {band_percent: 7.0}}\n/rig_2/**: {ros__parameters: {band_percent: 8.0}}\n'
+    )
+    assert read_trial(bag, rig=rig, namespace='rig_2')[0].params.sync.band_percent == 8.0

@@ -24,6 +24,7 @@ from dcdrw.recordings.joint_batch import decode_joints
 from dcdrw.recordings.mending import mend
 from dcdrw.recordings.recorder import Recorder, offered_qos
 from dcdrw.recordings.recording import Recording
+from dcdrw.trials.results import read_trial
 from tests.bags import TYPES, joint_state, write_bag
 
 numbers = st.lists(st.floats(width=64), max_size=5)
@@ -460,6 +461,16 @@ def test_topics_are_found_in_any_namespace_unless_several_fit(tmp_path):
             ValueError, match='no topic joint_states of sensor_msgs/msg/JointState; of this type it has: /rig/encoders'
         ):
             recording.find('joint_states')
+
+
+def test_names_that_would_break_a_line_or_command_a_terminal_are_escaped(tmp_path):
+    bag = write_bag(tmp_path / 'topic', MESSAGES[:3], '/joint\nstates\x1b[2J')
+    with Recording(bag) as recording, pytest.raises(ValueError, match=re.escape(r'it has: /joint\nstates\x1b[2J')):
+        recording.find('joint_states')
+    names = ['front\nwheel', 'rear_wheel\x1b[31m']
+    joints = write_bag(tmp_path / 'joints', [(10**18, joint_state(10**18, names, [0.1, 0.2]))])
+    with pytest.raises(ValueError, match=re.escape(r'the message names front\nwheel, rear_wheel\x1b[31m')):
+        read_trial(joints)
 
 
 def test_two_suites_are_told_apart_by_their_namespace(tmp_path):
