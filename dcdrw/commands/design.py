@@ -115,6 +115,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='PERCENT',
         help="in step is within ± this of 50 %% (default: %(default)g, the monitor's)",
     )
+    parser.add_argument(
+        '--seconds',
+        type=positive,
+        metavar='SECONDS',
+        help='how long a trial may last; what takes longer is not in step (default: 200 √(ℓ/g), about a minute)',
+    )
     parser.add_argument('--out', type=Path, metavar='DIR', help='write the card and design.json there')
     add_formats(parser, 'pdf', 'png')
     add_json(parser)
@@ -145,8 +151,9 @@ def run(options: argparse.Namespace) -> int:
     with Bar('judging', 'couplers') as bar:
         k, b = _bounds(options, task.rig)
         if parts:
-            bar.begin(GRID**2)
-            grid = score(task, *mesh(k, b), report=bar.more)
+            if options.out:  # for the card
+                bar.begin(GRID**2)
+                grid = score(task, *mesh(k, b), report=bar.more)
             bar.begin((CASES + 1) * offer.pairs)
             ranked = rank(task, parts, tolerance, bar.more)
             best = list(_best(ranked))
@@ -210,7 +217,7 @@ def recommended(found: Assessment, seen: Steps) -> bool:
 
 def _task(options: argparse.Namespace) -> Task:
     rig = chosen_params(options).rig
-    return Task(rig, default_seconds(rig), options.band)
+    return Task(rig, options.seconds or default_seconds(rig), options.band)
 
 
 def _bounds(options: argparse.Namespace, rig: RigParams) -> Iterator[tuple[float, float]]:
