@@ -113,7 +113,7 @@ const sameWheels = () => over && frame && board && JSON.stringify(over.wheels) =
 // Whether the earlier trial lies beneath, or why it does not.
 function showOver() {
   element('over').textContent = !over || !board ? ''
-    : !sameWheels() ? 'is of other wheels' : frame.start === null ? 'waits for the start of a trial' : 'lies beneath';
+    : !sameWheels() ? 'which is of other wheels' : frame.start === null ? 'which waits for the start of a trial' : 'which lies beneath';
 }
 
 function offerOvers(trials) {
