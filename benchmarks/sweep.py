@@ -58,12 +58,12 @@ def bare_kernel() -> Callable[[int], None]:
         work, parameters = ensemble._aligned(ensemble.SIZE), ensemble._parameters(take(pairs, part))
         motion = ensemble._blank(len(part), capacity)
         jobs.append(
-            (work, parameters, starts[part], SWEEP.seconds, ensemble.ENSEMBLE_TOLERANCE, None, None, None, *motion)
+            (work, parameters, starts[part], SWEEP.seconds, ensemble.ENSEMBLE_TOLERANCE, None, True, None, None, *motion)
         )
 
     def program(cores: int) -> None:
         for job in jobs:
-            job[9][:] = 0  # the counts
+            job[10][:] = 0  # the counts
         on_threads(cores, lambda job: ensemble._run(*job), jobs)
 
     return program

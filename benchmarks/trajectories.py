@@ -18,8 +18,8 @@ allows. `--seconds` is the time for which a quick program is repeated; its best 
 all programs alike: compare ratios.
 
 --against takes the ensemble of an earlier commit in the same run, a process each, in turns; 47104d3 is the last whose
-model has no gyration, restitution, friction and rolling resistance. It has no extremes between strikes either, so that
-they are left out of what is told as `bare`.
+model has no gyration, restitution, friction and rolling resistance. `extremes` watches the phase between strikes too, as
+a verdict needs it; the commit named has nothing of the kind.
 
 SciPy and heyoka are given the same form of the equations; heyoka, where it is installed, as expressions of its own,
 its strikes as terminal events, once one trajectory at a time and once in batches as wide as it recommends and twice so.
@@ -52,7 +52,7 @@ from dcdrw_sim.motion.compiled import AVAILABLE
 from dcdrw_sim.motion.ends import BACKWARD, End
 from dcdrw_sim.motion.ensemble import run_ensemble
 
-BARE = 'bare'  # as ensemble_speed.py knows it
+EXTREMES = 'extremes'  # as ensemble_speed.py knows it
 SCIPY_TOLERANCE = 3e-13
 TAYLOR_TOLERANCE = 1e-13  # of the simulation and of the ensemble
 HEYOKA_TOLERANCE = 2e-11  # it chooses its order by this: from 3e-11 on the error is 1.7e-9
@@ -304,9 +304,9 @@ def compare(points: Points, commit: str, seconds: float) -> None:
         gyration = [f'{wheel}.gyration=0.5' for wheel in ('front', 'rear')]
         programs = {
             f'at {commit[:10]}': _timer(folder, folder / 'earlier'),
-            'now, bare': _timer(folder, here, BARE),
-            'now, bare, gyration': _timer(folder, here, BARE, *gyration),
             'now': _timer(folder, here),
+            'now, gyration': _timer(folder, here, *gyration),
+            'now, extremes': _timer(folder, here, EXTREMES),
         }
         times: dict[str, list[list[float]]] = {name: [] for name in programs}
         for ask in programs.values():

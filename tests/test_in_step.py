@@ -34,7 +34,7 @@ def drawn(count: int) -> tuple[Rigs, np.ndarray]:
 
 
 RIGS, STATES = drawn(DRAWN)
-JUDGED = judge(run_pairs(RIGS, STATES, SECONDS, 400), RIGS, 1)[0]
+JUDGED = judge(run_pairs(RIGS, STATES, SECONDS, 400, extremes=True), RIGS, 1)[0]
 WALKING = JUDGED.verdict <= Verdict.ELSEWHERE
 
 

@@ -9,8 +9,9 @@ import time
 import numpy as np
 
 from dcdrw_sim.model.presets import preset
+from dcdrw_sim.motion.ensemble import run_ensemble
 
-BARE = 'bare'
+EXTREMES = 'extremes'
 
 SECONDS, CAPACITY, TOLERANCE = 100.0, 400, 1e-13
 
@@ -20,20 +21,15 @@ def main(points: str, *columns: str) -> None:
 
     Args:
         points: file of starts and couplers.
-        columns: parameters of all pairs, as `front.gyration=0.5`; BARE leaves out the extremes between strikes.
+        columns: parameters of all pairs, as `front.gyration=0.5`; EXTREMES watches the phase between strikes too.
 
     """
-    if BARE in columns:
-        from dcdrw_sim.motion import extremes
-
-        extremes.phase_extremes = lambda w, l, pitch1, pitch2, h: (0.0, 0.0)
-    from dcdrw_sim.motion.ensemble import run_ensemble
-
     saved, rig = np.load(points), preset('paper-sweep').resolved()
-    given = {name: float(value) for name, _, value in (column.partition('=') for column in columns if column != BARE)}
+    given = {name: float(value) for name, _, value in (column.partition('=') for column in columns if column != EXTREMES)}
+    more = {'extremes': True} if EXTREMES in columns else {}  # which earlier packages do not know
     for _ in sys.stdin:
         start = time.perf_counter()
-        result = run_ensemble(rig, saved['states'], SECONDS, CAPACITY, TOLERANCE, k=saved['k'], b=saved['b'], **given)
+        result = run_ensemble(rig, saved['states'], SECONDS, CAPACITY, TOLERANCE, k=saved['k'], b=saved['b'], **given, **more)
         taken = time.perf_counter() - start
         print(1e6 * taken / len(saved['k']), 1e6 * taken / result.counts.sum(), flush=True)
 

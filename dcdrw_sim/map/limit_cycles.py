@@ -212,7 +212,7 @@ def step_maps(rigs: Rigs, states: Floats, which: NDArray[np.intp]) -> _Steps:
     omega1, theta2, _ = states.T
     possible = np.isfinite(states).all(axis=1) & (omega1 > 0.0) & (abs(theta2) <= some.rear.alpha)
     some, states = take(some, possible), states[possible]
-    motion = run_pairs(some, np.column_stack([some.front.alpha, states]), math.inf, 3, strict=False)
+    motion = run_pairs(some, np.column_stack([some.front.alpha, states]), math.inf, 3, strict=False, extremes=True)
     first, rear, last = motion.strikes.T
     returns = (
         (motion.ends == End.STRIKES)

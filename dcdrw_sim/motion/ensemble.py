@@ -67,8 +67,8 @@ STRIKE = np.dtype(
     ]
 )
 """One strike: wheel 1 or 2, direction, time [s], and the state just before it; the least and the greatest phase
-difference θ1/2α1 − θ2/2α2 [steps] since the strike before or the start, these instants included. The phase p is that
-and whole steps."""
+difference θ1/2α1 − θ2/2α2 [steps] since the strike before or the start, these instants included, NaN unless asked for.
+The phase p is that and whole steps."""
 
 STATE = (THETA1, OMEGA1, THETA2, OMEGA2)
 # Plain numbers, which compile.
@@ -143,6 +143,7 @@ def run_ensemble(
     capacity: int,
     tolerance: float = ENSEMBLE_TOLERANCE,
     strict: bool = True,
+    extremes: bool = False,
     **columns: ArrayLike,
 ) -> Ensemble:
     """Run many pairs of one rig, each with its own start and, where given, its own parameters.
@@ -154,6 +155,7 @@ def run_ensemble(
         capacity: strikes to record of each pair; a pair with so many ends.
         tolerance: last term of the angles' series at the end of a step [rad].
         strict: a motion too fast to follow is an error; else its pair ends TOO_FAST.
+        extremes: whether the phase difference between strikes is watched, which takes a fifth longer; `judge` needs it.
         columns: parameters by their (dotted) names, as `spread`.
 
     Raises:
@@ -161,7 +163,8 @@ def run_ensemble(
         MotionError: a motion is too fast to follow.
 
     """
-    return run_pairs(spread(rig, len(np.atleast_1d(states)), columns), states, seconds, capacity, tolerance, strict)
+    rigs = spread(rig, len(np.atleast_1d(states)), columns)
+    return run_pairs(rigs, states, seconds, capacity, tolerance, strict, extremes)
 
 
 def run_pairs(
@@ -171,6 +174,7 @@ def run_pairs(
     capacity: int,
     tolerance: float = ENSEMBLE_TOLERANCE,
     strict: bool = True,
+    extremes: bool = False,
 ) -> Ensemble:
     """Run many pairs, each of its own rig.
 
@@ -181,6 +185,7 @@ def run_pairs(
         capacity: strikes to record of each pair.
         tolerance: of the angles' series [rad].
         strict: whether a motion too fast to follow is an error.
+        extremes: whether the phase difference between strikes is watched.
 
     Raises:
         ValueError: an impossible state, limit or shape.
@@ -193,7 +198,7 @@ def run_pairs(
             f'seconds must be ≥ 0, capacity ≥ 1 and tolerance > 0, got {seconds}, {capacity} and {tolerance}'
         )
     ensemble = _blank(len(starts), capacity)
-    _follow(rigs, starts, seconds, tolerance, ensemble, None, None)
+    _follow(rigs, starts, seconds, tolerance, ensemble, True if extremes else None)
     if strict and (lost := np.flatnonzero(ensemble.ends == TOO_FAST)).size:
         raise MotionError(
             f'the motion of pair {lost[0]} at t = {ensemble.durations[lost[0]]:.9g} s is too fast to follow'
@@ -221,7 +226,7 @@ def sample_pairs(rigs: Rigs, states: Floats, times: Floats, tolerance: float = E
     """
     starts = _accepted_starts(rigs, states)
     rotations = np.empty((len(starts), len(times), 2))
-    _follow(rigs, starts, float(times[-1]), tolerance, _blank(len(starts), MOST_STRIKES), times, rotations)
+    _follow(rigs, starts, float(times[-1]), tolerance, _blank(len(starts), MOST_STRIKES), None, times, rotations)
     return rotations
 
 
@@ -243,13 +248,14 @@ def _follow(
     seconds: float,
     tolerance: float,
     ensemble: Ensemble,
-    times: Floats | None,
-    rotations: Floats | None,
+    watched: Present,
+    times: Floats | None = None,
+    rotations: Floats | None = None,
 ) -> None:
     if len(starts):
         work, parameters = _aligned(SIZE), _parameters(rigs)
         with np.errstate(all='ignore'):
-            _run(work, parameters, starts, float(seconds), float(tolerance), rubs(rigs), times, rotations, *ensemble)
+            _run(work, parameters, starts, float(seconds), float(tolerance), rubs(rigs), watched, times, rotations, *ensemble)
 
 
 def spread(rig: RigParams, count: int, columns: Mapping[str, ArrayLike]) -> Rigs:
@@ -417,7 +423,7 @@ def _stance_distance(w: Table, l: int) -> Row:
 
 
 @compiled
-def _load(w: Table, l: int, parameters: Floats, start: Floats) -> bool:
+def _load(w: Table, l: int, parameters: Floats, start: Floats, watched: Present) -> bool:
     """Put a pair at its start into a lane; whether a wheel stands there."""
     for row in range(taylor.PARAMETERS):
         w[taylor.FIRST_PARAMETER + row * LANES + l] = parameters[row]
@@ -435,36 +441,39 @@ def _load(w: Table, l: int, parameters: Floats, start: Floats) -> bool:
         if w[STATE[2 * i + 1] + l] == 0.0 and abs(w[STATE[2 * i] + l]) >= w[taylor.ALPHA1 + i * LANES + l]:
             stands = _rest(w, l, i) or stands
             w[taylor.S + l] = _stance_distance(w, l)
-    _watch_phase(w, l)
+    _watch_phase(w, l, watched)
     return stands
 
 
 @compiled
-def _watch_phase(w: Table, l: int) -> None:
+def _watch_phase(w: Table, l: int, watched: Present) -> None:
     """Begin with the extremes of the phase difference anew."""
-    w[LOW + l] = w[HIGH + l] = w[THETA1 + l] * w[PITCH1 + l] - w[THETA2 + l] * w[PITCH2 + l]
-    w[RATE + l] = w[OMEGA1 + l] * w[PITCH1 + l] - w[OMEGA2 + l] * w[PITCH2 + l]
+    if watched is not None:
+        w[LOW + l] = w[HIGH + l] = w[THETA1 + l] * w[PITCH1 + l] - w[THETA2 + l] * w[PITCH2 + l]
+        w[RATE + l] = w[OMEGA1 + l] * w[PITCH1 + l] - w[OMEGA2 + l] * w[PITCH2 + l]
 
 
 @compiled
-def _phase_range(w: Table, l: int) -> tuple[float, float]:
-    """The extremes of the phase difference up to now."""
+def _phase_range(w: Table, l: int, watched: Present) -> tuple[float, float]:
+    """The extremes of the phase difference up to now; NaN where nobody watches it."""
+    if watched is None:
+        return math.nan, math.nan
     now = w[THETA1 + l] * w[PITCH1 + l] - w[THETA2 + l] * w[PITCH2 + l]
     return min(w[LOW + l], now), max(w[HIGH + l], now)
 
 
 @compiled
-def _record(w: Table, l: int, i: int, direction: int, record: NDArray[np.void]) -> None:
+def _record(w: Table, l: int, i: int, direction: int, watched: Present, record: NDArray[np.void]) -> None:
     """Note a strike of wheel i, its angle exactly on its guard."""
     w[STATE[2 * i] + l] = direction * w[taylor.ALPHA1 + i * LANES + l]
     record['wheel'], record['direction'], record['t'] = i + 1, direction, w[TIME + l]
     for j in range(4):
         record['state'][j] = w[STATE[j] + l]
-    record['low'], record['high'] = _phase_range(w, l)
+    record['low'], record['high'] = _phase_range(w, l, watched)
 
 
 @compiled
-def _strike(w: Table, l: int, i: int, direction: int) -> int:
+def _strike(w: Table, l: int, i: int, direction: int, watched: Present) -> int:
     """Put wheel i on its next spoke; how the run ends with that, if it does."""
     theta, omega, row = STATE[2 * i] + l, STATE[2 * i + 1] + l, i * LANES + l
     w[theta], w[omega] = reset(w[taylor.ALPHA1 + row], w[taylor.KEPT1 + row], w[omega], direction)
@@ -473,7 +482,7 @@ def _strike(w: Table, l: int, i: int, direction: int) -> int:
     w[LAST1 + row], w[ROLLED1 + row] = w[TIME + l], direction
     stands = abs(w[omega]) < STANDING_SPEED * w[SPEED1 + row] and _rest(w, l, i)
     w[taylor.S + l] = _stance_distance(w, l)
-    _watch_phase(w, l)
+    _watch_phase(w, l, watched)
     return FALLEN if fallen else STANDING if stands else NONE_YET
 
 
@@ -506,6 +515,7 @@ def _run(
     seconds: float,
     tolerance: float,
     friction: Present,
+    watched: Present,
     times: Floats | None,
     rotations: Floats | None,
     records: NDArray[np.void],
@@ -519,14 +529,14 @@ def _run(
     total, capacity = records.shape
     following, active = 0, 0
     for l in range(LANES):  # a lane without a pair computes something, and nobody looks
-        _load(w, l, parameters[0], starts[0])
+        _load(w, l, parameters[0], starts[0], watched)
         w[PAIR + l] = NO_PAIR
     while True:
         for l in range(LANES):
             while w[PAIR + l] == NO_PAIR and following < total:
-                if _load(w, l, parameters[following], starts[following]):
+                if _load(w, l, parameters[following], starts[following], watched):
                     ends[following] = STANDING
-                    tails[following, 0], tails[following, 1] = _phase_range(w, l)
+                    tails[following, 0], tails[following, 1] = _phase_range(w, l, watched)
                     if times is not None and rotations is not None:
                         _hold(w, l, rotations[following])
                 else:
@@ -543,20 +553,22 @@ def _run(
             w[STEP + l] = max(0.0, min(w[REACH + l], seconds - w[TIME + l]))
         _cut_steps(w)
         theta1, omega1, theta2, omega2 = motion(lanes, lanes[STEP], lanes[STEP])
-        lanes[RATE_AHEAD] = omega1 * lanes[PITCH1] - omega2 * lanes[PITCH2]
-        # Where it starts towards zero so fast that it may get there, the rate may change its sign twice.
-        relative = lanes[OMEGA1 + LANES] * lanes[PITCH1] - lanes[OMEGA2 + LANES] * lanes[PITCH2]
-        lanes[TANGENT] = lanes[RATE] + relative * lanes[STEP]
-        for l in range(LANES):
-            if (w[RATE + l] * w[RATE_AHEAD + l] < 0.0 or w[RATE + l] * w[TANGENT + l] < 0.0) and w[PAIR + l] != NO_PAIR:
-                least, greatest = phase_extremes(w, l, w[PITCH1 + l], w[PITCH2 + l], w[STEP + l])
-                w[LOW + l], w[HIGH + l] = min(w[LOW + l], least), max(w[HIGH + l], greatest)
+        if watched is not None:
+            lanes[RATE_AHEAD] = omega1 * lanes[PITCH1] - omega2 * lanes[PITCH2]
+            # Where it starts towards zero so fast that it may get there, the rate may change its sign twice.
+            relative = lanes[OMEGA1 + LANES] * lanes[PITCH1] - lanes[OMEGA2 + LANES] * lanes[PITCH2]
+            lanes[TANGENT] = lanes[RATE] + relative * lanes[STEP]
+            for l in range(LANES):
+                turns = w[RATE + l] * w[RATE_AHEAD + l] < 0.0 or w[RATE + l] * w[TANGENT + l] < 0.0
+                if turns and w[PAIR + l] != NO_PAIR:
+                    least, greatest = phase_extremes(w, l, w[PITCH1 + l], w[PITCH2 + l], w[STEP + l])
+                    w[LOW + l], w[HIGH + l] = min(w[LOW + l], least), max(w[HIGH + l], greatest)
+            lanes[RATE] = lanes[RATE_AHEAD]
         if times is not None and rotations is not None:
             for l in range(LANES):
                 if w[PAIR + l] != NO_PAIR:
                     _sample(w, l, times, rotations[int(w[PAIR + l])])
         lanes[THETA1], lanes[OMEGA1], lanes[THETA2], lanes[OMEGA2] = theta1, omega1, theta2, omega2
-        lanes[RATE] = lanes[RATE_AHEAD]
         lanes[TIME] = lanes[TIME] + lanes[STEP]
         for l in range(LANES):
             if w[PAIR + l] == NO_PAIR:
@@ -568,9 +580,9 @@ def _run(
                 end = TOO_FAST
             elif w[WHEEL + l] > 0.0:
                 i, direction = int(w[WHEEL + l]) - 1, int(w[DIRECTION + l])
-                _record(w, l, i, direction, records[mine, counts[mine]])
+                _record(w, l, i, direction, watched, records[mine, counts[mine]])
                 counts[mine] += 1
-                end = _strike(w, l, i, direction)
+                end = _strike(w, l, i, direction, watched)
                 if end == NONE_YET and counts[mine] == capacity:
                     end = STRIKES
             if end == NONE_YET and w[TIME + l] >= seconds:
@@ -579,7 +591,7 @@ def _run(
                 end = STALLED
             if end != NONE_YET:
                 ends[mine], durations[mine], w[PAIR + l] = end, w[TIME + l], NO_PAIR
-                tails[mine, 0], tails[mine, 1] = _phase_range(w, l)
+                tails[mine, 0], tails[mine, 1] = _phase_range(w, l, watched)
                 if times is not None and rotations is not None:
                     _hold(w, l, rotations[mine])
                 active -= 1

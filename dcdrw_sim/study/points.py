@@ -137,7 +137,7 @@ def run_starts(rigs: Rigs, seconds: float, phases: tuple[float, ...], room: int)
     """The motions of N rigs from every start, and the rig of each motion; arguments as of `judge_points`."""
     states = np.concatenate([_start_states(alone, phases) for alone in uncoupled(rigs)])
     pairs = take(rigs, np.repeat(np.arange(len(rigs.k)), len(phases)))
-    return pairs, run_pairs(pairs, states, seconds, 2 * room + ROCKING, strict=False)
+    return pairs, run_pairs(pairs, states, seconds, 2 * room + ROCKING, strict=False, extremes=True)
 
 
 def section_room(rigs: Rigs, seconds: float) -> int:

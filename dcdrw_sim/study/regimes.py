@@ -155,7 +155,7 @@ def judge_starts(rigs: Rigs, states: Floats, seconds: float) -> Judgement:
 
     """
     capacity = 4 * section_room(rigs, seconds) + ROCKING
-    return judge(run_pairs(rigs, states, seconds, capacity, strict=False), rigs, 1)[0]
+    return judge(run_pairs(rigs, states, seconds, capacity, strict=False, extremes=True), rigs, 1)[0]
 
 
 def bisect(holds: Callable[[Floats], Bools], inside: ArrayLike, outside: ArrayLike, halvings: int) -> Floats:

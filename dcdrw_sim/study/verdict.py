@@ -125,7 +125,12 @@ def judge(
         band_percent: in step is within ± this [% of a step].
         theta2_band: in place of BAND [rad].
 
+    Raises:
+        ValueError: the motions were run without their extremes, on which "in step at every instant" rests.
+
     """
+    if np.isnan(ensemble.tails).any():
+        raise ValueError('these motions have no extremes between strikes to judge: run them with extremes=True')
     total = len(ensemble.counts)
     sections = Sections(*(np.full((total, capacity), math.nan) for _ in Sections._fields))
     steps, time, strike_steps, steps_to_enter, time_to_enter, steps_to_settle, theta2 = np.full((7, total), math.nan)

@@ -102,7 +102,16 @@ def test_the_length_at_rest_follows_the_stance_distance_of_its_pair():
         run_ensemble(UNEQUAL, [(-0.2, 1.3, 0.1, 1.4)] * 2, 4.0, 40, S0=[0.9, 1.3], **more)
         for more in ({'D0': np.array([0.9, 1.3]) + UNEQUAL.front.length * math.sin(UNEQUAL.front.alpha)}, {})
     )
-    assert np.array_equal(given_.strikes, derived.strikes)
+    assert given_.strikes.tobytes() == derived.strikes.tobytes()
+
+
+def test_watching_the_phase_between_strikes_changes_no_motion():
+    states, columns = sweep(30)
+    plain, watched = (run_ensemble(SWEEP, states, 60.0, 300, extremes=asked, **columns) for asked in (False, True))
+    for name in ('wheel', 'direction', 't', 'state'):
+        assert plain.strikes[name] == pytest.approx(watched.strikes[name], abs=1e-12)
+    assert np.isnan(plain.tails).all()
+    assert (watched.tails[:, 0] <= watched.tails[:, 1]).all()
 
 
 # Lanes

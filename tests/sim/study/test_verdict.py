@@ -97,6 +97,12 @@ def test_a_motion_of_no_strike_is_undecided():
     assert np.isnan(sections.time).all()
 
 
+def test_a_motion_whose_extremes_nobody_watched_is_not_judged():
+    ensemble = run_ensemble(GENTLE, [(-0.2, 0.1, 0.1, 1.4)], 4.0, 400)
+    with pytest.raises(ValueError, match='extremes=True'):
+        judge(ensemble, spread(GENTLE, 1, {}), 50)
+
+
 # The paper's condition
 
 
@@ -146,7 +152,7 @@ def test_a_wider_band_is_entered_no_later():
 def test_sections_are_those_of_the_return_map():
     return_map = ReturnMap(SWEEP)
     start = return_map.at_phase(0.3)
-    ensemble = run_ensemble(SWEEP, [(SWEEP.front.alpha, *start)], 40.0, 200)
+    ensemble = run_ensemble(SWEEP, [(SWEEP.front.alpha, *start)], 40.0, 200, extremes=True)
     judgement, sections = judge(ensemble, spread(SWEEP, 1, {}), 30)
     count = int(judgement.sections[0])
     states = return_map.iterate(start, count - 1)
@@ -161,7 +167,7 @@ def test_sections_are_those_of_the_return_map():
 
 def test_a_slipped_step_is_told_and_lengthens_the_coupler():
     start = State(SWEEP.front.alpha, 0.36, -0.2, 1.0)  # the rear wheel overtakes
-    ensemble = run_ensemble(SWEEP._replace(k=0.0, b=0.0), [start], 30.0, 100)
+    ensemble = run_ensemble(SWEEP._replace(k=0.0, b=0.0), [start], 30.0, 100, extremes=True)
     judgement, sections = judge(ensemble, spread(SWEEP, 1, {}), 30)
     assert judgement.slips[0] >= 1
     n = int(judgement.step_difference[0])
@@ -194,7 +200,7 @@ def test_verdicts_of_motions_that_are_known():
             'slope': [SWEEP.slope] * 3 + [-0.02, SWEEP.slope],
         },
     )
-    judgement, _ = judge(run_pairs(rigs, [start] * 5, 200.0, 1000), rigs, 200)
+    judgement, _ = judge(run_pairs(rigs, [start] * 5, 200.0, 1000, extremes=True), rigs, 200)
     assert [*map(Verdict, judgement.verdict)] == [
         Verdict.IN_STEP,
         Verdict.STANDS,
@@ -205,10 +211,10 @@ def test_verdicts_of_motions_that_are_known():
 
 
 def test_a_wheel_that_rocks_when_time_is_over_has_stalled():
-    ensemble = run_ensemble(GENTLE, [(-0.2, 0.1, 0.1, 1.4)], 4.0, 400)
+    ensemble = run_ensemble(GENTLE, [(-0.2, 0.1, 0.1, 1.4)], 4.0, 400, extremes=True)
     assert judge(ensemble, spread(GENTLE, 1, {}), 50)[0].verdict[0] == Verdict.STALLS
     assert (
-        judge(run_ensemble(UNCOUPLED, [(-0.1, -1.5, 0.1, 1.4)], 6.0, 400), spread(GENTLE, 1, {}), 50)[0].verdict[0]
+        judge(run_ensemble(UNCOUPLED, [(-0.1, -1.5, 0.1, 1.4)], 6.0, 400, extremes=True), spread(GENTLE, 1, {}), 50)[0].verdict[0]
         == Verdict.FALLS
     )
 
@@ -221,7 +227,7 @@ def test_units_do_not_matter_to_a_judgement(phase, k, b):
     judgements = []
     for one, time in ((rig, 1.0), (dimensional(rig, scales), scales.time)):
         start = (one.front.alpha, *ReturnMap(one).at_phase(phase))
-        judgements.append(judge(run_ensemble(one, [start], 60.0 * time, 600), spread(one, 1, {}), 100)[0])
+        judgements.append(judge(run_ensemble(one, [start], 60.0 * time, 600, extremes=True), spread(one, 1, {}), 100)[0])
     assert judgements[0].sections[0] == judgements[1].sections[0]
     assert judgements[0].theta2[0] == pytest.approx(judgements[1].theta2[0], abs=1e-6)
 
