@@ -56,10 +56,9 @@ def bare_kernel() -> Callable[[int], None]:
     jobs = []
     for part in np.array_split(np.arange(COUNT), CORES):
         work, parameters = ensemble._aligned(ensemble.SIZE), ensemble._parameters(take(pairs, part))
-        motion = ensemble._blank(len(part), capacity)
-        jobs.append(
-            (work, parameters, starts[part], SWEEP.seconds, ensemble.ENSEMBLE_TOLERANCE, None, True, None, None, *motion)
-        )
+        motion = ensemble._blank(len(part), capacity, extremes=True)
+        limits = SWEEP.seconds, ensemble.ENSEMBLE_TOLERANCE
+        jobs.append((work, parameters, starts[part], *limits, None, True, None, None, *motion))
 
     def program(cores: int) -> None:
         for job in jobs:

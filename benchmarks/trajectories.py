@@ -18,8 +18,8 @@ allows. `--seconds` is the time for which a quick program is repeated; its best 
 all programs alike: compare ratios.
 
 --against takes the ensemble of an earlier commit in the same run, a process each, in turns; 47104d3 is the last whose
-model has no gyration, restitution, friction and rolling resistance. `extremes` watches the phase between strikes too, as
-a verdict needs it; the commit named has nothing of the kind.
+model has no gyration, restitution, friction and rolling resistance. `extremes` watches the phase between strikes too,
+as a verdict needs it; that commit has nothing of the kind.
 
 SciPy and heyoka are given the same form of the equations; heyoka, where it is installed, as expressions of its own,
 its strikes as terminal events, once one trajectory at a time and once in batches as wide as it recommends and twice so.

@@ -25,11 +25,15 @@ def main(points: str, *columns: str) -> None:
 
     """
     saved, rig = np.load(points), preset('paper-sweep').resolved()
-    given = {name: float(value) for name, _, value in (column.partition('=') for column in columns if column != EXTREMES)}
+    given = {
+        name: float(value) for name, _, value in (column.partition('=') for column in columns if column != EXTREMES)
+    }
     more = {'extremes': True} if EXTREMES in columns else {}  # which earlier packages do not know
     for _ in sys.stdin:
         start = time.perf_counter()
-        result = run_ensemble(rig, saved['states'], SECONDS, CAPACITY, TOLERANCE, k=saved['k'], b=saved['b'], **given, **more)
+        result = run_ensemble(
+            rig, saved['states'], SECONDS, CAPACITY, TOLERANCE, k=saved['k'], b=saved['b'], **given, **more
+        )
         taken = time.perf_counter() - start
         print(1e6 * taken / len(saved['k']), 1e6 * taken / result.counts.sum(), flush=True)
 

@@ -56,19 +56,11 @@ from dcdrw_sim.motion.taylor import (
 ENSEMBLE_TOLERANCE = 5e-16
 """Last term of the angles' series at the end of a step [rad]: strikes within 1e-9 over 100 time units."""
 
-STRIKE = np.dtype(
-    [
-        ('wheel', np.int8),
-        ('direction', np.int8),
-        ('t', float),
-        ('state', float, (4,)),
-        ('low', float),
-        ('high', float),
-    ]
-)
-"""One strike: wheel 1 or 2, direction, time [s], and the state just before it; the least and the greatest phase
-difference θ1/2α1 − θ2/2α2 [steps] since the strike before or the start, these instants included, NaN unless asked for.
-The phase p is that and whole steps."""
+STRIKE = np.dtype([('wheel', np.int8), ('direction', np.int8), ('t', float), ('state', float, (4,))])
+"""One strike: wheel 1 or 2, direction, time [s], and the state just before it."""
+WATCHED_STRIKE = np.dtype([*STRIKE.descr, ('low', float), ('high', float)])
+"""A strike, and the least and the greatest phase difference θ1/2α1 − θ2/2α2 [steps] since the strike before or the
+start, these instants included. The phase p is that and whole steps."""
 
 STATE = (THETA1, OMEGA1, THETA2, OMEGA2)
 # Plain numbers, which compile.
@@ -125,7 +117,7 @@ class Ensemble(NamedTuple):
     """What became of each of N pairs."""
 
     strikes: NDArray[np.void]
-    """dtype STRIKE, shape (N, capacity); each row is filled up to its count."""
+    """dtype STRIKE or, with extremes, WATCHED_STRIKE, shape (N, capacity); each row is filled up to its count."""
     counts: NDArray[np.int64]
     """Strikes of each pair, shape (N,)."""
     ends: NDArray[np.int64]
@@ -133,7 +125,8 @@ class Ensemble(NamedTuple):
     durations: Floats
     """Time at each pair's end [s], shape (N,)."""
     tails: Floats
-    """The least and the greatest phase difference since each pair's last strike, as in STRIKE, shape (N, 2)."""
+    """The least and the greatest phase difference since each pair's last strike, as in WATCHED_STRIKE; NaN without
+    extremes. Shape (N, 2)."""
 
 
 def run_ensemble(
@@ -197,7 +190,7 @@ def run_pairs(
         raise ValueError(
             f'seconds must be ≥ 0, capacity ≥ 1 and tolerance > 0, got {seconds}, {capacity} and {tolerance}'
         )
-    ensemble = _blank(len(starts), capacity)
+    ensemble = _blank(len(starts), capacity, extremes)
     _follow(rigs, starts, seconds, tolerance, ensemble, True if extremes else None)
     if strict and (lost := np.flatnonzero(ensemble.ends == TOO_FAST)).size:
         raise MotionError(
@@ -255,7 +248,8 @@ def _follow(
     if len(starts):
         work, parameters = _aligned(SIZE), _parameters(rigs)
         with np.errstate(all='ignore'):
-            _run(work, parameters, starts, float(seconds), float(tolerance), rubs(rigs), watched, times, rotations, *ensemble)
+            seconds, friction = float(seconds), rubs(rigs)
+            _run(work, parameters, starts, seconds, float(tolerance), friction, watched, times, rotations, *ensemble)
 
 
 def spread(rig: RigParams, count: int, columns: Mapping[str, ArrayLike]) -> Rigs:
@@ -320,10 +314,11 @@ def _column(row: int) -> int:
     return (row - taylor.FIRST_PARAMETER) // LANES
 
 
-def _blank(count: int, capacity: int) -> Ensemble:
+def _blank(count: int, capacity: int, extremes: bool = False) -> Ensemble:
     """Room for what becomes of so many pairs."""
     counts, ends = np.zeros((2, count), np.int64)
-    return Ensemble(np.zeros((count, capacity), STRIKE), counts, ends, np.zeros(count), np.zeros((count, 2)))
+    strikes = np.zeros((count, capacity), WATCHED_STRIKE if extremes else STRIKE)
+    return Ensemble(strikes, counts, ends, np.zeros(count), np.zeros((count, 2)))
 
 
 def _aligned(size: int) -> Floats:
@@ -469,7 +464,8 @@ def _record(w: Table, l: int, i: int, direction: int, watched: Present, record: 
     record['wheel'], record['direction'], record['t'] = i + 1, direction, w[TIME + l]
     for j in range(4):
         record['state'][j] = w[STATE[j] + l]
-    record['low'], record['high'] = _phase_range(w, l, watched)
+    if watched is not None:
+        record['low'], record['high'] = _phase_range(w, l, watched)
 
 
 @compiled

@@ -16,7 +16,7 @@ from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.rigs import rig_at, take
 from dcdrw_sim.model.scaling import Scales, dimensional
 from dcdrw_sim.motion.ends import End
-from dcdrw_sim.motion.ensemble import STRIKE, TOO_FAST, Ensemble, run_ensemble, run_pairs, spread
+from dcdrw_sim.motion.ensemble import TOO_FAST, WATCHED_STRIKE, Ensemble, run_ensemble, run_pairs, spread
 from dcdrw_sim.study.verdict import BAND, HOLD, Verdict, judge
 from tests.sim.rigs import ALPHA, GENTLE, UNCOUPLED, between
 
@@ -32,7 +32,7 @@ def walk(theta2_deg, end=End.TIME, late=1.0, rocked=None, swing=0.0):
         strikes += [(2, 1, k - 0.5, (0.0, 1.0, ALPHA, 1.1)), (1, 1, float(k), (ALPHA, 1.2, math.radians(theta2), 1.3))]
     strikes = strikes[1:]  # from the first section on
     # As if the phase went straight from strike to strike, but for a swing to either side of the goal.
-    records, phase = np.zeros((1, len(strikes)), STRIKE), 0.5 - math.radians(theta2_deg[0]) / (2 * ALPHA)
+    records, phase = np.zeros((1, len(strikes)), WATCHED_STRIKE), 0.5 - math.radians(theta2_deg[0]) / (2 * ALPHA)
     for record, (wheel, direction, t, state) in zip(records[0], strikes, strict=True):
         before, phase = phase, 0.5 - state[2] / (2 * ALPHA) if wheel == 1 else 0.5
         record['wheel'], record['direction'], record['t'], record['state'] = wheel, direction, t, state
@@ -90,7 +90,9 @@ def test_every_verdict_has_a_meaning_and_the_worst_is_the_largest():
 
 
 def test_a_motion_of_no_strike_is_undecided():
-    nothing = Ensemble(np.zeros((1, 4), STRIKE), np.array([0]), np.array([End.TIME]), np.array([0.1]), np.zeros((1, 2)))
+    nothing = Ensemble(
+        np.zeros((1, 4), WATCHED_STRIKE), np.array([0]), np.array([End.TIME]), np.array([0.1]), np.zeros((1, 2))
+    )
     judgement, sections = judge(nothing, spread(RigParams(), 1, {}), 3)
     assert judgement.verdict[0] == Verdict.UNDECIDED
     assert math.isnan(judgement.theta2[0])
@@ -214,7 +216,9 @@ def test_a_wheel_that_rocks_when_time_is_over_has_stalled():
     ensemble = run_ensemble(GENTLE, [(-0.2, 0.1, 0.1, 1.4)], 4.0, 400, extremes=True)
     assert judge(ensemble, spread(GENTLE, 1, {}), 50)[0].verdict[0] == Verdict.STALLS
     assert (
-        judge(run_ensemble(UNCOUPLED, [(-0.1, -1.5, 0.1, 1.4)], 6.0, 400, extremes=True), spread(GENTLE, 1, {}), 50)[0].verdict[0]
+        judge(run_ensemble(UNCOUPLED, [(-0.1, -1.5, 0.1, 1.4)], 6.0, 400, extremes=True), spread(GENTLE, 1, {}), 50)[
+            0
+        ].verdict[0]
         == Verdict.FALLS
     )
 
@@ -227,7 +231,9 @@ def test_units_do_not_matter_to_a_judgement(phase, k, b):
     judgements = []
     for one, time in ((rig, 1.0), (dimensional(rig, scales), scales.time)):
         start = (one.front.alpha, *ReturnMap(one).at_phase(phase))
-        judgements.append(judge(run_ensemble(one, [start], 60.0 * time, 600, extremes=True), spread(one, 1, {}), 100)[0])
+        judgements.append(
+            judge(run_ensemble(one, [start], 60.0 * time, 600, extremes=True), spread(one, 1, {}), 100)[0]
+        )
     assert judgements[0].sections[0] == judgements[1].sections[0]
     assert judgements[0].theta2[0] == pytest.approx(judgements[1].theta2[0], abs=1e-6)
 
