@@ -1,6 +1,7 @@
 """Text files and tables of strangers: read within bounds, and every trouble told with the file's name."""
 
 import csv
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterator
 from io import StringIO
 from pathlib import Path
@@ -16,8 +17,13 @@ def one_line(text: object) -> str:
     return ''.join(c if c.isprintable() else c.encode('unicode_escape').decode() for c in str(text))
 
 
-def read_text(path: Path, largest: int = LARGEST_TEXT) -> str:
+def read_text(path: Path, largest: int = LARGEST_TEXT, windows: bool = False) -> str:
     """The content of a text file in UTF-8.
+
+    Args:
+        path: of the file.
+        largest: that is read [bytes].
+        windows: take what spreadsheets write there, too: UTF-16 that begins with its mark, and Windows-1252.
 
     Raises:
         ValueError: too large, or not UTF-8; names the file.
@@ -28,9 +34,13 @@ def read_text(path: Path, largest: int = LARGEST_TEXT) -> str:
         data = file.read(largest + 1)
     if len(data) > largest:
         raise ValueError(f'{path} is larger than {largest // 2**20} MB: is it the right file?')
+    if windows and data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+        return data.decode('utf-16', errors='replace')
     try:
         return data.decode('utf-8-sig')
     except UnicodeDecodeError as error:
+        if windows:
+            return data.decode('cp1252', errors='replace')
         line = data.count(b'\n', 0, error.start) + 1
         raise ValueError(f'{path}, line {line}: byte 0x{data[error.start]:02x} is not UTF-8 text') from None
 

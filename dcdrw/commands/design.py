@@ -74,11 +74,11 @@ either way and the slope is a tenth gentler than thought: where parts are bought
 Where the rig file tells how well the rig is known (dcdrw identify writes that), couplers are also judged on rigs that
 are as likely; the surest is the best on the worst of these.
 
---available takes a table with a heading, kind,value,name, and a row for each part, separated by commas, semicolons or
-tabs (config/parts.csv shows one). Kind is spring or dashpot, or damper; units stand in the heading (value [N/mm]) or in
-the cell (0.1 N·s/mm), else they are N/m and N·s/m. Where it has columns max_force, max_stroke and max_speed, no pair is
-recommended that asks for more of a part. Every pair is judged, in the place of the search, and those that come into
-step are listed, the best first; --out writes all of them to pairs.csv.
+--available takes a table with a heading, kind,value,name, and a row for each part, separated by commas, semicolons,
+tabs or bars (config/parts.csv shows one). Kind is spring or dashpot, or damper; units stand in the heading (value
+[N/mm]), in a column unit, or in the cell (0.1 N·s/mm), else they are N/m and N·s/m. Where it has columns max_force,
+max_stroke and max_speed, no pair is recommended that asks for more of a part. Every pair is judged, in the place of the
+search, and those that come into step are listed, the best first; --out writes all of them to pairs.csv.
 
 examples:
   dcdrw design                                            for the paper's rig

@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from dcdrw.console import add_json, check_json, number, tell, tell_where
 from dcdrw.drawings.figure_files import add_formats, figure_files, write_figure
 from dcdrw.files import add_force, refuse_existing, to_json, write_text, write_whole
@@ -17,6 +19,7 @@ from dcdrw.trials.rolling import rolling_samples
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.topics import JOINT_STATES
+from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.figures.identification_figures import draw_identification
 from dcdrw_sim.figures.style import for_print, new_figure
 from dcdrw_sim.identification.findings import (
@@ -239,21 +242,23 @@ def record(recordings: Sequence[Path], outcome: Outcome) -> dict[str, Any]:
                 'begins': trial.samples.begins,
                 'seconds': float(trial.samples.seconds[-1]),
                 'start': dict(zip(('theta1', 'omega1', 'theta2', 'omega2'), trial.start.tolist(), strict=True)),
-                'start_errors': errors,
+                'start_errors': starts.tolist(),
+                'zeros': trial.zeros.tolist(),
+                'zero_errors': zeros.tolist(),
                 'noise': trial.noise,
                 'memory': trial.memory,
                 'outliers': int(trial.outliers.sum()),
                 'unexplained': left,
             }
-            for trial, left, errors in zip(fit.trials, outcome.misfits, _start_errors(fit), strict=True)
+            for trial, left, (starts, zeros) in zip(fit.trials, outcome.misfits, _own_errors(fit), strict=True)
         ],
         'next': [gain._asdict() for gain in outcome.gains],
     }
 
 
-def _start_errors(fit: Fit) -> list[list[float]]:
-    errors = [math.sqrt(variance) for variance in fit.whole_covariance.diagonal()[len(fit.known.unknowns) :]]
-    return [errors[first : first + 4] for first in range(0, len(errors), 4)]
+def _own_errors(fit: Fit) -> list[tuple[Floats, Floats]]:
+    errors = np.sqrt(fit.whole_covariance.diagonal())
+    return [fit.problem.own(trial, errors) for trial in range(len(fit.trials))]
 
 
 def _finding(finding: Finding) -> dict[str, Any]:

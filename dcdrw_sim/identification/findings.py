@@ -206,7 +206,7 @@ def _further(fit: Fit, phase: float) -> Floats:
     state[0] += 1e-3  # away from its guard
     samples = trial.samples._replace(steps=1)
     problem = Problem(after, [samples], [trial.deviation])
-    return problem.information(np.concatenate([fit.coordinates, state]))
+    return problem.information(np.concatenate([fit.coordinates, state, [0.0, 0.0]]))
 
 
 def _gain(fit: Fit, what: str, covariance: Floats) -> Gain:

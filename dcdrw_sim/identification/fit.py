@@ -1,6 +1,7 @@
 """Least squares: the rig, and each trial's start, under which the model's samples are nearest to those of the trials.
 
-Samples of an angle are continuous functions of all parameters, strikes and all: only speeds jump. Their derivatives are
+Of each trial six more numbers are sought: its start, and by what the zeros of both wheels' rotations are off. Samples
+of an angle are continuous functions of all parameters, strikes and all: only speeds jump. Their derivatives are
 differences of trajectories that run side by side, as one ensemble.
 """
 
@@ -40,6 +41,10 @@ WORTHWHILE = 0.1
 """What a search begun anew must gain [of squares in standard deviations] to be followed by another."""
 EVALUATIONS = 60
 """At most, of one search."""
+ZERO = math.radians(0.02)
+"""To what a wheel's zero is taken to be known, as well as `dcdrw calibrate` finds it [rad]."""
+OWN = 6
+"""Numbers of a trial's own: θ1, ω1, θ2, ω2 at its first sample, and the zeros of ψ1 and ψ2."""
 Mask = NDArray[np.bool_]
 
 
@@ -49,6 +54,8 @@ class Explained(NamedTuple):
     samples: Samples
     start: Floats
     """[θ1, ω1, θ2, ω2] at the first sample."""
+    zeros: Floats
+    """What ψ1 and ψ2 were measured to be too great [rad]."""
     residuals: Floats
     """What was measured less what the model has [rad], shape (T, 2)."""
     outliers: Mask
@@ -90,12 +97,12 @@ class Problem:
         self._at: Floats = np.empty(0)
         self._found: tuple[Floats, Floats] = (self._at, self._at)
         front, rear = known.rig.front, known.rig.rear
-        farthest = np.tile([front.alpha, math.inf, rear.alpha, math.inf], len(trials))
+        farthest = np.tile([front.alpha, math.inf, rear.alpha, math.inf, math.inf, math.inf], len(trials))
         low, high = known.bounds()
         self.low, self.high = np.concatenate([low, -farthest]), np.concatenate([high, farthest])
 
     def rotations(self, trial: int, points: Floats) -> Floats:
-        """ψ of a trial's samples [rad] at N points: coordinates and the trial's start, shape (N, T, 2)."""
+        """ψ of a trial's samples [rad] at N points: coordinates and the trial's own, shape (N, T, 2)."""
         columns = {
             name: column
             for unknown, coordinates in zip(self.known.unknowns, points.T, strict=False)
@@ -103,10 +110,11 @@ class Problem:
         }
         rig, samples = self.known.rig, self.trials[trial]
         rig = rig._replace(S0=float(stance_distance(rig.front, rig.rear, rig.S0, samples.steps, 0)))
-        return sample_pairs(spread(rig, len(points), columns), points[:, self._size :], samples.seconds, TOLERANCE)
+        pairs, starts, zeros = spread(rig, len(points), columns), points[:, -OWN:-2], points[:, -2:]
+        return sample_pairs(pairs, starts, samples.seconds, TOLERANCE) + zeros[:, None]
 
     def residuals(self, x: Floats) -> Floats:
-        """Weighed residuals, then what the unknowns are off from what was known, in standard deviations."""
+        """Weighed residuals, then what zeros and unknowns are off from what was known, in standard deviations."""
         return self._evaluate(x)[0]
 
     def jacobian(self, x: Floats) -> Floats:
@@ -118,19 +126,32 @@ class Problem:
             return self._found
         size, residuals, blocks = self._size, [], []
         for index, (samples, used, deviation) in enumerate(zip(self.trials, self._used, self._deviations, strict=True)):
-            own = [*range(size), *range(size + 4 * index, size + 4 * index + 4)]
-            steps = np.concatenate([self._steps, np.full(4, STEP)])
+            own = [*range(size), *self._own(index)]
+            steps = np.concatenate([self._steps, np.full(OWN, STEP)])
             steps = np.where(x[own] + steps > self.high[own], -steps, steps)
             rotations = self.rotations(index, x[own] + np.vstack([np.zeros(len(own)), np.diag(steps)]))
             residuals.append((rotations[0] - samples.rotations)[used] / deviation)
             block = np.zeros((np.count_nonzero(used), len(x)))
             block[:, own] = (rotations[1:] - rotations[0])[:, used].T / steps / deviation
             blocks.append(block)
+        zeros = [place for index in range(len(self.trials)) for place in self._own(index)[-2:]]
+        residuals.append(x[zeros] / ZERO)
+        blocks.append(np.eye(len(x))[zeros] / ZERO)
         residuals.append(solve_triangular(self._root, x[:size] - self.known.coordinates, lower=True))
         before = np.zeros((size, len(x)))
         before[:, :size] = solve_triangular(self._root, np.eye(size), lower=True)
         self._at, self._found = x.copy(), (np.concatenate(residuals), np.vstack([*blocks, before]))
         return self._found
+
+    def _own(self, trial: int) -> range:
+        """Where a trial's own numbers stand in a point."""
+        first = self._size + OWN * trial
+        return range(first, first + OWN)
+
+    def own(self, trial: int, x: Floats) -> tuple[Floats, Floats]:
+        """Start and zeros of a trial, at a point or in its errors."""
+        numbers = x[self._own(trial)]
+        return numbers[:-2], numbers[-2:]
 
     def misfit(self, x: Floats) -> float:
         """The sum that a robust `solve` makes small."""
@@ -187,12 +208,12 @@ class Problem:
         return best
 
     def information(self, x: Floats) -> Floats:
-        """What the trials tell of the unknowns, their starts being unknown: an inverse covariance, shape (P, P)."""
+        """What the trials tell of the unknowns, their own being unknown: an inverse covariance, shape (P, P)."""
         size = self._size
         weighed = self.jacobian(x)[:-size]
         whole = weighed.T @ weighed
-        cross, starts = whole[:size, size:], whole[size:, size:]
-        return np.asarray(whole[:size, :size] - cross @ np.linalg.solve(starts, cross.T))
+        cross, own = whole[:size, size:], whole[size:, size:]
+        return np.asarray(whole[:size, :size] - cross @ np.linalg.solve(own, cross.T))
 
 
 class Fit(NamedTuple):
@@ -201,7 +222,7 @@ class Fit(NamedTuple):
     problem: Problem
     """As it was solved in the end."""
     point: Floats
-    """Its solution: coordinates, then each trial's start."""
+    """Its solution: coordinates, then each trial's own."""
     whole_covariance: Floats
     """Of the point."""
     trials: tuple[Explained, ...]
@@ -243,12 +264,12 @@ def identify(known: Knowledge, trials: Sequence[Samples]) -> Fit:
 
     """
     rough = [max(trial.noise(), COARSEST) for trial in trials]
-    states = [trial.first_state() for trial in trials]
+    owns = [np.append(trial.first_state(), [0.0, 0.0]) for trial in trials]
     first = [Problem(known, [trial.until(window) for trial in trials], rough) for window in WINDOWS]
     ends = []
     for inside in INSIDE:
         least = known.bounds()[0] + inside * np.sqrt(np.diag(known.covariance))
-        x = np.concatenate([np.maximum(known.coordinates, least), *states])
+        x = np.concatenate([np.maximum(known.coordinates, least), *owns])
         for problem in first:
             x = problem.solve(x)
         ends.append(x)
@@ -266,13 +287,14 @@ def identify(known: Knowledge, trials: Sequence[Samples]) -> Fit:
 def _explained(problem: Problem, x: Floats) -> list[Explained]:
     size, found = len(problem.known.unknowns), []
     for index, samples in enumerate(problem.trials):
-        start = x[size + 4 * index : size + 4 * index + 4]
-        rotations = problem.rotations(index, np.concatenate([x[:size], start])[None])[0]
+        start, zeros = problem.own(index, x)
+        rotations = problem.rotations(index, np.concatenate([x[:size], start, zeros])[None])[0]
         residuals = samples.rotations - rotations
         spread_of = max(float(np.median(np.abs(residuals))) / 0.6745, 1e-9)
         outliers = np.abs(residuals) > OUTLYING * spread_of
         noise = float(np.sqrt(np.mean(residuals[~outliers] ** 2)))
-        found.append(Explained(samples, start, residuals, outliers, max(noise, 1e-9), _memory(residuals, outliers)))
+        memory = _memory(residuals, outliers)
+        found.append(Explained(samples, start, zeros, residuals, outliers, max(noise, 1e-9), memory))
     return found
 
 

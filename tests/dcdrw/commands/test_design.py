@@ -41,7 +41,7 @@ def test_best_pair_of_parts_with_card_and_numbers(tmp_path, parts, capsys):
         rows = list(csv.DictReader(file))
     assert [row['spring'] for row in rows] == [pair['spring'] for pair in found['pairs']]
     assert (rows[0]['spring'], rows[0]['dashpot']) == ('firm', 'thin')
-    assert "skipped, line 6: kind must be spring, dashpot, damper, got 'rope'" in output
+    assert "skipped, line 6: kind must be spring, dashpot or damper, got 'rope'" in output
     assert found['skipped']
     assert (tmp_path / 'out' / 'card.pdf').read_bytes().startswith(b'%PDF')
     assert (tmp_path / 'out' / 'card.png').read_bytes().startswith(b'\x89PNG')
