@@ -52,7 +52,7 @@ def trial_figure(trial: Analysis, title: str, width: float = SCREEN) -> Any:
     course = _Course.of(trial)
     force_known = bool(np.isfinite(course.motion.coupler_force).any())
     title = _in_lines(title, width)
-    height = 3.3 + 0.57 * width if force_known else 2.8 + 0.46 * width
+    height = 4.2 + 0.31 * width if force_known else 3.5 + 0.26 * width
     figure = new_figure(width, height + 0.16 * (title.count('\n') + 1))
     panels = 4 if force_known else 3
     angles, phase, gait, *force = figure.subplots(panels, 1, sharex=True, height_ratios=(3, 3, 1.3, 2)[:panels])

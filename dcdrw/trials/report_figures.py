@@ -58,7 +58,7 @@ def draw_times(trials: Sequence[tuple[int, RecordedTrial]]) -> Any:
 
 def draw_decay(trial: RecordedTrial) -> Any:
     """The error at each strike of the front wheel, and the geometric decay fitted to it."""
-    figure, axes = _axes()
+    figure, axes = _axes(2.6)
     band, errors = trial.analysis.params.sync.band_percent, _seen_errors(trial)
     steps = np.arange(1, len(errors) + 1)
     axes.axhspan(-band, band, color=BAND, alpha=0.18, linewidth=0, label=f'±{band:g} %')
@@ -100,8 +100,8 @@ def _thinned(trial: RecordedTrial) -> tuple[Floats, Floats]:
     return np.insert(motion.seconds[kept], places, math.nan), np.insert(phase[kept], places, math.nan)
 
 
-def _axes() -> tuple[Any, Any]:
-    figure = new_figure(SCREEN, 3.3)
+def _axes(height: float = 3.3) -> tuple[Any, Any]:
+    figure = new_figure(SCREEN, height)
     axes = figure.subplots()
     axes.spines[['top', 'right']].set_visible(False)
     axes.margins(x=0.01)

@@ -27,7 +27,7 @@ th, td { padding: .3rem .45rem; border-bottom: 1px solid var(--line); text-align
 th { font-weight: 600; line-height: 1.25; vertical-align: bottom; } th small { font-weight: 400; }
 td { white-space: nowrap; }
 th.text, td.text { text-align: left; white-space: normal; }
-td.name { min-width: 11em; max-width: 18em; overflow-wrap: break-word; }
+td.name { min-width: 8em; max-width: 18em; overflow-wrap: break-word; } td.name + td { min-width: 9.6em; }
 .wide { overflow-x: auto; }
 .ok { color: var(--ok); font-weight: 600; } .bad { color: var(--bad); font-weight: 600; } .none { opacity: .75; }
 .verdict { font-size: 1.15rem; } .remarks { margin-top: .3rem; }
@@ -44,7 +44,9 @@ dt { font-weight: 600; } dd { margin: 0; overflow-wrap: anywhere; }
   @page { margin: 12mm; }
   body { font-size: 10pt; max-width: none; margin: 0; padding: 0; }
   table { font-size: 7pt; } th, td { padding: .15rem .2rem; }
-  figure { margin: .4rem 0; padding: 0; } figure svg { width: auto; max-width: 100%; max-height: 118mm; margin: auto; }
+  figure { margin: .4rem 0; padding: 0; } figure svg { width: 96%; margin: auto; }
+  figcaption { font-size: 8pt; padding: 0; } dl { font-size: 8pt; padding: .2rem .6rem; break-inside: avoid; }
+  h2 { margin-top: 0; } td.name + td { min-width: 0; }
   .verdict { font-size: 11pt; }
   h2 { break-before: page; } .wide { overflow: visible; } .downloads, fieldset button { display: none; }
   a { color: inherit; text-decoration: none; }
@@ -184,6 +186,15 @@ def _verdict(trial: RecordedTrial) -> str:
     return f'<span class="{kind}">{words}{less}</span>'
 
 
+def _sentence(trial: RecordedTrial) -> str:
+    """The verdict in large print, its first words as in the table."""
+    words, kind = _VERDICTS[trial.summary.state]
+    sentence = verdict(trial.analysis)
+    if sentence.lower().startswith(words):
+        return f'<span class="{kind}">{sentence[: len(words)]}</span>{html.escape(sentence[len(words) :])}'
+    return f'{_verdict(trial)}. {html.escape(sentence)}'
+
+
 def _overlays(trials: Sequence[tuple[int, RecordedTrial]]) -> str:
     """All trials in one picture each of steps and of time, and the choice of those to be seen."""
     choice = ''.join(
@@ -214,7 +225,7 @@ def _section(number: int, trial: RecordedTrial) -> str:
         for name, value in trial.about.items()
     )
     text = f'<h2 id="trial{number}">{html.escape(trial.name)}</h2>\n'
-    text += f'<p class="verdict">{_verdict(trial)}. {html.escape(verdict(trial.analysis))}</p>\n'
+    text += f'<p class="verdict">{_sentence(trial)}</p>\n'
     if said:
         text += f'<ul class="remarks">{"".join(f"<li>{html.escape(one)}</li>" for one in said)}</ul>\n'
     if trial.analysis.ran:
