@@ -312,7 +312,7 @@ def told(task: Task, found: Assessment, tolerance: float) -> Iterator[tuple[str,
             ),
         )
     yield from _bought(task, found)
-    yield 'margins', '; '.join(f'{name} {_margin(margin)}' for name, margin in found.margins.items())
+    yield 'margins', 'in step with ' + ', '.join(f'{name} {_margin(one)}' for name, one in found.margins.items())
     slope = found.margins['slope']
     yield (
         'gentlest slope',
@@ -477,9 +477,9 @@ def _named(parts: Sequence[Part], kind: str, value: float) -> str:
 
 
 def _margin(margin: Margin) -> str:
-    low = f'{margin.low:.2f}' if margin.low_verdict is not None else f'<{1 / WIDEST:.2f}'
-    high = f'{margin.high:.2f}' if margin.high_verdict is not None else f'>{min(margin.high, WIDEST):.0f}'
-    return f'×{low} to ×{high}'
+    low = f'{margin.low:.2f}' if margin.low_verdict is not None else f'{1 / WIDEST:.2f} or less'
+    high = f'{margin.high:.2f}' if margin.high_verdict is not None else f'{min(margin.high, WIDEST):.0f} or more'
+    return f'{low} to {high} times'
 
 
 def _outcome(variation: Variation) -> str:
