@@ -3,6 +3,7 @@
 import { begin, colour } from './canvas.js';
 
 export const WINDOW_SECONDS = 20;
+const SHORTEST_GAP = 0.05;  // [s]: a point comes each 0.02 s at most
 const LEFT = 40, RIGHT = 10, BOTTOM = 16;
 
 // Less time where there is less room, so that stances stay wide enough to read.
@@ -60,6 +61,12 @@ function ticksBetween(low, high, count) {
   return ticks;
 }
 
+// The median time between points.
+function usualStep(points) {
+  const steps = points.slice(1).map(([t], i) => t - points[i][0]).sort((one, other) => one - other);
+  return steps.length ? steps[steps.length >> 1] : 0;
+}
+
 // Beneath lies an earlier trial, from the start of this one on.
 export function drawPhi(points, now, board, over) {
   const pitch = board ? board.pitch_deg : 30;
@@ -101,10 +108,11 @@ export function drawPhi(points, now, board, over) {
 
 // Cut where a gap in time or a jump must not be joined by a line.
 function* pieces(points, jumps) {
+  const gap = Math.max(3 * usualStep(points), SHORTEST_GAP);
   let piece = [];
   for (const point of points) {
     const last = piece.at(-1);
-    if (last && (point[0] - last[0] > 0.3 || point[0] < last[0] || jumps(point, last))) {
+    if (last && (point[0] - last[0] > gap || point[0] < last[0] || jumps(point, last))) {
       yield piece;
       piece = [];
     }
