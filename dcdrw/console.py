@@ -8,7 +8,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
@@ -167,6 +167,18 @@ def check_json(options: argparse.Namespace) -> None:
         refuse_existing([options.json], getattr(options, 'force', False))
 
 
+@contextmanager
+def _stopped_on_error(shown: Any) -> Iterator[None]:
+    """Where a signal comes while it starts, the terminal gets its cursor back."""
+    try:
+        yield
+    except BaseException:
+        with suppress(IndexError):  # of rich, where it is half begun
+            shown.stop()
+        shown.console.show_cursor(True)
+        raise
+
+
 class LiveLine:
     """One line on a terminal that is written over, fitted to its width; elsewhere nothing."""
 
@@ -184,7 +196,8 @@ class LiveLine:
             from rich.live import Live
 
             self._live = Live(console=Console(stderr=True), auto_refresh=False)
-            self._live.start()
+            with _stopped_on_error(self._live):
+                self._live.start()
         return self
 
     def show(self, text: str, style: str = '') -> None:
@@ -232,8 +245,9 @@ class Bar:
                 console=Console(stderr=True),
                 transient=True,
             )
-            self._progress.start()
-            self._task = self._progress.add_task(self._what, total=None, pace='')
+            with _stopped_on_error(self._progress):
+                self._progress.start()
+                self._task = self._progress.add_task(self._what, total=None, pace='')
         return self
 
     def begin(self, total: int | None, done: int = 0) -> None:

@@ -28,12 +28,12 @@ with Bar('counting', 'sheep') as bar:
 """
 
 
-def seen(columns: int, **environment: str) -> str:
+def seen(columns: int, code: str = LINE, **environment: str) -> str:
     """What a terminal of so many columns is sent."""
     parent, child = pty.openpty()
     termios.tcsetwinsize(child, (24, columns)) if hasattr(termios, 'tcsetwinsize') else None
     process = subprocess.Popen(
-        [sys.executable, '-c', LINE],
+        [sys.executable, '-c', code],
         stderr=child,
         stdout=child,
         cwd=ROOT,
@@ -58,6 +58,31 @@ def test_the_live_line_fits_into_the_terminal(columns):
     lines = re.split(r'[\r\n]+', plain)
     assert any(line.startswith('2 x') and line.rstrip().endswith('…') for line in lines)
     assert max(map(len, lines)) <= columns
+
+
+START = """
+from unittest.mock import patch
+from rich.console import Console
+from dcdrw.console import Bar, LiveLine
+show = Console.show_cursor
+def interrupted(console, shown=True):
+    done = show(console, shown)
+    if not shown:
+        raise KeyboardInterrupt
+    return done
+with patch.object(Console, 'show_cursor', interrupted):
+    for line in LiveLine(), Bar('counting', 'sheep'):
+        try:
+            line.__enter__()
+        except KeyboardInterrupt:
+            print('interrupted')
+"""
+
+
+def test_a_signal_while_a_line_starts_leaves_the_cursor():
+    shown = seen(80, START)
+    assert shown.count('interrupted') == 2
+    assert shown.rindex('\x1b[?25h') > shown.rindex('\x1b[?25l')
 
 
 def test_colours_are_shown_but_where_nobody_wants_them():
