@@ -18,7 +18,7 @@ steps; from no start slower than the passive pair.
 """
 
 import argparse
-import itertools
+import functools
 import math
 import sys
 from collections import deque
@@ -39,7 +39,7 @@ from dcdrw_msgs_py.in_step import BAND_PERCENT, HOLD_STEPS, in_step_from, strike
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.rolling import steps_ahead
 from dcdrw_msgs_py.samples import SECOND, JointSample, PhaseSample, Turn
-from dcdrw_sim.map.holding import Law, Method, law, plant
+from dcdrw_sim.map.holding import Law, Method, corners, eased, law, plant, plants_near
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.model.start import start
@@ -57,6 +57,8 @@ SECONDS = 10.0
 """Length of a walk with a law."""
 PASSIVE_SECONDS = 60.0
 DELAY = 0.05
+UNCERTAIN = 0.3
+"""Masses, b and k are each so much less or more."""
 HELD_GAIN, PROPORTIONAL_GAIN = 80.0, 150.0
 """[N per step]"""
 SLOPES = (1.5, 2.0, 2.5, 3.0)
@@ -128,7 +130,14 @@ class Core:
 
 def gains(chosen: Law) -> HoldGains:
     """A law as parameters of the node."""
-    return HoldGains(tuple(map(float, chosen.state)), tuple(map(float, chosen.gain)), chosen.force, chosen.gain_before)
+    state, gain = (tuple(map(float, values)) for values in (chosen.state, chosen.gain))
+    return HoldGains(state, gain, chosen.force, chosen.gain_before, chosen.middle)
+
+
+@functools.cache
+def hold_law(rig: RigParams, delay: float, method: Method) -> Law:
+    """The law as `dcdrw control` computes it."""
+    return eased(law(plant(rig, delay=delay), method), plants_near(rig, UNCERTAIN, delay))
 
 
 def controller(task: Task) -> PhaseLaw | Core:
@@ -139,7 +148,7 @@ def controller(task: Task) -> PhaseLaw | Core:
     if task.name == 'proportional':
         return PhaseLaw(PROPORTIONAL_GAIN, False, known)
     method: Method = 'lqr' if task.name == 'lqr' else 'deadbeat'
-    chosen = law(plant(known._replace(b=known.b + task.damping), delay=task.delay), method)
+    chosen = hold_law(known._replace(b=known.b + task.damping), task.delay, method)
     return Core(SynchronizerParams(law='hold', hold=gains(chosen), damping=task.damping))
 
 
@@ -235,23 +244,13 @@ def row(name: str, walks: Sequence[Walk]) -> str:
     )
 
 
-def varied(rig: RigParams, m: float, b: float, k: float) -> RigParams:
-    """A rig with so many times its masses, damping and stiffness."""
-    return rig._replace(
-        front=rig.front._replace(mass=m * rig.front.mass),
-        rear=rig.rear._replace(mass=m * rig.rear.mass),
-        b=b * rig.b,
-        k=k * rig.k,
-    )
-
-
 def table() -> list[tuple[str, list[Task], RigParams]]:
     """Each row: its name, its walks, and the rig."""
     rows = []
     for name in ('deadbeat', 'lqr', 'held', 'proportional'):
         rows.append((name, [Task(name, PAPER, PAPER, phase) for phase in PHASES], PAPER))
-    for factors in itertools.product((0.7, 1.3), repeat=3):
-        rig = varied(PAPER, *factors)
+    for rig in corners(PAPER, UNCERTAIN):
+        factors = rig.front.mass / PAPER.front.mass, rig.b / PAPER.b, rig.k / PAPER.k
         told_ = ', '.join(f'{"mbk"[i]} {100 * factor - 100:+.0f} %' for i, factor in enumerate(factors))
         for name in ('deadbeat', 'proportional'):
             rows.append((f'{name}, 50 ms, {told_}', [Task(name, rig, PAPER, p, DELAY) for p in PHASES], rig))

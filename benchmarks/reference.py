@@ -3,13 +3,16 @@
     PYTHONPATH=. python benchmarks/reference.py [--seconds 120]
 
 Simulated people walk as the front wheel of the simulator does (1 kHz, through the phase estimator), with the named
-variability of a stride, or every step evenly within ±10 % of the mean. The recorded people are those in
-tests/data/gait, their legs by the leg tracker; a foot on the force plate stands for both legs, half a stride apart. A
+variability of a stride, or every step evenly within ±10 % of the mean; one stops now and then, at any place of a
+stride, stands and starts again, told by leg phases alone, and is judged by the node's own count. The recorded people
+are those in tests/data/gait, their legs by the leg tracker; a foot on the force plate stands for both legs, half a
+stride apart. A
 trajectory takes `lead` (50 ms) to the joints. The phase that it carries is held against a quarter of each true stride:
 motion capture's and the plate's where people were recorded.
 
 Columns: the robot's footfalls in the whole gait; their distance from a quarter stride ahead, rms [ms] (goal: 25 ms);
-steps of the four feet in the order 1-4-2-3 (goal: 99 %); processor time per sample [µs]. `!` marks a goal missed.
+steps of the four feet in the order 1-4-2-3 (goal: 99 %); how often the node would have said WARN or ERROR of the order;
+processor time per sample [µs]. `!` marks a goal missed.
 """
 
 import argparse
@@ -51,27 +54,41 @@ class Score(NamedTuple):
     """From a quarter stride ahead [s]."""
     right: float
     """Share of the steps of all four feet that came in order."""
+    alarms: int
+    """How often the node's own judgement of the order went bad."""
     trajectories: list[Trajectory]
     seconds: float
     """Processor time per sample [s]."""
 
 
-def judge(samples: Iterable[GaitSample], strikes: tuple[Floats, Floats]) -> Score:
-    """Let the robot follow, always enabled, and hold its footfalls against the person's true heel strikes [s]."""
+def judge(samples: Iterable[GaitSample], strikes: tuple[Floats, Floats] | None) -> Score:
+    """Let the robot follow, always enabled.
+
+    Args:
+        samples: of the person.
+        strikes: true heel strikes [s], against which the robot's are held; None: the node's own judgement.
+
+    """
     core = LegReference(ReferenceParams(), read_joint_table(DEFAULT))
-    trajectories, count, spent, start_ns = [], 0, 0.0, None
-    falls = [Fall(foot, round(t * 1e9)) for foot, times in zip(FRONT_FEET, strikes, strict=True) for t in times]
+    trajectories, count, spent, start_ns, alarms, bad = [], 0, 0.0, None, 0, False
+    falls = [Fall(foot, round(t * 1e9)) for foot, times in zip(FRONT_FEET, strikes or (), strict=False) for t in times]
     for sample in samples:
         begin = time.process_time()
         core.enable(0.0, True)
         update = core.update(sample, 0.0, sample.stamp_ns)
         spent, count = spent + time.process_time() - begin, count + 1
         assert update
-        if core.status().state is State.WALKING and start_ns is None:
+        status = core.status()
+        if status.state is State.WALKING and start_ns is None:
             start_ns = sample.stamp_ns
+        was_bad, bad = bad, False in status.order.lately
+        alarms += bad and not was_bad
         falls += update.falls
         if update.trajectory:
             trajectories.append(update.trajectory)
+    if not strikes:
+        own = core.status().order
+        return Score(own.falls, own.lead_error, 1.0 - own.wrong / own.falls, alarms, trajectories, spent / count)
     order = FootfallOrder()
     assert start_ns is not None
     end_ns = 1e9 * min(times[-1] for times in strikes)  # the truth ends before the walk does
@@ -81,6 +98,7 @@ def judge(samples: Iterable[GaitSample], strikes: tuple[Floats, Floats]) -> Scor
         sum(fall.foot in REAR_FEET for fall in judged),
         float(np.sqrt(np.mean(np.square(errors)))),
         1.0 - order.wrong / order.falls,
+        alarms,
         trajectories,
         spent / count,
     )
@@ -112,6 +130,23 @@ def on_the_treadmill() -> Score:
     ]
     readings = [LegReading(round(t * 1e9), leg, WrenchReading(f)) for t, leg, f in sorted(rows)]
     return judge(samples_of(follow(readings)), (strikes, strikes + half))
+
+
+def stopping(seconds: float, seed: int = 0) -> Score:
+    """A person who stops within half a stride after five to ten strides, stands for two to four seconds and starts."""
+    chance, tick = random.Random(seed), 0.005
+    stride, pace, speed, until, walks = 0.0, 0.9, 0.0, 0.0, False
+    samples = []
+    for i in range(round(seconds / tick)):
+        if walks and stride >= until:
+            walks, until = False, i * tick + chance.uniform(2.0, 4.0)
+        elif not walks and speed == 0.0 and i * tick >= until:
+            walks, until, pace = True, stride + chance.uniform(5.0, 10.0), chance.uniform(0.7, 1.1)
+        rate = pace * tick / 0.4  # within 0.4 s to the pace, and to a stand
+        speed = min(speed + rate, pace) if walks else max(speed - rate, 0.0)
+        stride += speed * tick
+        samples.append(GaitSample(round((i + 1) * tick * 1e9), (stride, stride - 0.5)))
+    return judge(samples, None)
 
 
 def even_steps(seed: int) -> Iterator[float]:
@@ -151,7 +186,13 @@ def cases(seconds: float) -> dict[str, partial[Score]]:
         'simulated, 2.7 % per stride': partial(simulated_person, seconds, None),
         'simulated, 1.7 % per stride': partial(simulated_person, seconds, None, variability_percent=1.7),
         'simulated, 2.7 %, faster by 20 % a minute': partial(simulated_person, seconds, None, drift_percent=20.0),
+        'simulated, 2.7 %, slower by 20 % a minute': partial(simulated_person, seconds, None, drift_percent=-20.0),
+        'simulated, 4 % per stride': partial(simulated_person, seconds, None, variability_percent=4.0),
+        'simulated, 2.7 %, 1.3 steps/s': partial(simulated_person, seconds, None, cadence=1.3),
+        'simulated, 2.7 %, 2.0 steps/s': partial(simulated_person, seconds, None, cadence=2.0),
         'simulated, ±10 % per step': partial(simulated_person, seconds, even_steps(0)),
+        'simulated, ±10 % per step, another': partial(simulated_person, seconds, even_steps(1)),
+        'simulated, stops and starts': partial(stopping, seconds),
         'recorded, 2 × 20 m with a turn': partial(walking_20_m),
         'recorded, on a treadmill': partial(on_the_treadmill),
     }
@@ -162,12 +203,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else '')
     parser.add_argument('--seconds', type=float, default=120.0, help='length of the simulated walks')
     options = parser.parse_args()
-    print(f'{"":44} falls   rms [ms]  in order   sample')
+    print(f'{"":44} falls   rms [ms]  in order  alarms   sample')
     for name, case in cases(options.seconds).items():
         score = case()
         print(
             f'{name:44}{score.falls:6}{1e3 * score.rms:10.1f}{"!" if score.rms > LATE_GOAL else " "}'
-            f'{100.0 * score.right:8.1f} %{"!" if score.right < ORDER_GOAL else " "}{1e6 * score.seconds:6.0f} µs',
+            f'{100.0 * score.right:8.1f} %{"!" if score.right < ORDER_GOAL else " "}{score.alarms:6}'
+            f'{1e6 * score.seconds:7.0f} µs',
             flush=True,
         )
     return 0

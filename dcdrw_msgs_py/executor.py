@@ -15,9 +15,12 @@ from dcdrw_msgs_py.topics import CLOCK
 
 TURN_SECONDS = 0.01
 """How long one subscription is read at most before timers, services and the other subscriptions have their turn [s]."""
-SELDOM_SECONDS = 0.01
-"""While messages and timers keep coming, services, clients and events are looked at so seldom [s]."""
+SELDOM_SECONDS = 0.02
+"""While messages and timers keep coming, services and clients are looked at so seldom [s]."""
+RARELY_SECONDS = 0.2
+"""And so rarely what else there is: events, of which each publisher and each subscription has several [s]."""
 _STREAM_KINDS = ('subscription', 'timer', 'guard_condition')
+_ASKING_KINDS = ('service', 'client')
 
 
 class _Streams(NamedTuple):
@@ -34,6 +37,7 @@ class _Seldom(NamedTuple):
     clients: tuple[Any, ...]
     services: tuple[Any, ...]
     waitables: tuple[Any, ...]
+    """What happens rarely."""
 
 
 class StreamExecutor(Executor):
@@ -49,6 +53,7 @@ class StreamExecutor(Executor):
     _streams = _Streams()
     _seldom: _Seldom | None = None
     _seldom_due = 0.0
+    _rarely_due = 0.0
     _wait_set: Any = None
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
@@ -70,9 +75,17 @@ class StreamExecutor(Executor):
         if not ready:
             seldom = _Seldom(*self._all_of(_Seldom))
             if (streams, seldom) != (self._streams, self._seldom):
-                self._streams, self._seldom = streams, seldom
+                self._streams, self._seldom, self._rarely_due = streams, seldom, 0.0
                 self._wait_set = self._make_wait_set(streams, seldom)
-            ready = self._wait(streams, seldom, end)
+            asked = False
+            if time.monotonic() < self._rarely_due:
+                seldom = seldom._replace(waitables=())
+                ready = self._wait(streams, seldom, min(end, self._rarely_due))
+                asked = any(map(self._wait_set.get_ready_entities, _ASKING_KINDS))
+            if not (ready or asked):
+                seldom = self._seldom
+                ready = self._wait(streams, seldom, end)
+                self._rarely_due = time.monotonic() + RARELY_SECONDS
             self._seldom_due = time.monotonic() + SELDOM_SECONDS
         for timer in streams.timers:
             if timer.handle.pointer in ready and timer.handle.is_timer_ready():

@@ -240,10 +240,12 @@ class Inbox:
         self._dropping, self._passed_at = False, 0.0
         self.dropped = 0
         """Messages that were dropped so far."""
+        self.age = 0.0
+        """How long the message that is passed on has waited here [s]."""
 
     def __call__(self, message: Any, info: Any) -> None:
         """Take a message with rclpy's MessageInfo."""
-        age = (time.time_ns() - info['received_timestamp']) * 1e-9
+        self.age = age = max((time.time_ns() - info['received_timestamp']) * 1e-9, 0.0)
         if self._dropping:
             self._dropping = age > FRESH
         elif age <= OLD:
@@ -294,6 +296,25 @@ def listen(
         return node.create_subscription(message_type(topic), topic.name, callback, qos)
     qos = QoSProfile(depth=max(topic.depth, depth), reliability=ReliabilityPolicy.BEST_EFFORT)
     return node.create_subscription(message_type(topic), topic.name, Inbox(callback).__call__, qos)
+
+
+def listen_aged(
+    node: Node,
+    topic: Topic,
+    callback: Callable[[Any, float], None],
+    take_sample: Callable[[Any], None] | None = None,
+) -> Any:
+    """As `listen`; the callback is told as well how long ago the message was received [s].
+
+    Where a process was not let run, what has waited is told from what is fresh.
+    """
+
+    def pass_on(message: Any) -> None:
+        callback(message, inbox.age if inbox else 0.0)
+
+    subscription = listen(node, topic, pass_on, take_sample=take_sample)
+    inbox = subscription and subscription.callback.__self__
+    return subscription
 
 
 def follow_runs(node: Node, runs: Runs) -> Any:
@@ -350,9 +371,9 @@ class Age:
     def __init__(self) -> None:
         self._at = -math.inf
 
-    def renew(self) -> None:
-        """It happened now."""
-        self._at = time.monotonic()
+    def renew(self, ago: float = 0.0) -> None:
+        """It happened so many seconds ago."""
+        self._at = time.monotonic() - ago
 
     @property
     def seconds(self) -> float:
@@ -365,7 +386,9 @@ def _warn_of_unknown(nodes: list[Node], arguments: list[str]) -> None:
     node = nodes[0]
     known = [parameter.name for each in nodes for parameter in each.get_parameters_by_prefix('').values()]
     for flag, value in pairwise(arguments):
-        name = value.split(':=')[0].split(':')[-1]
+        whose, _, name = value.split(':=')[0].rpartition(':')
+        if whose and whose not in [one.get_name() for one in nodes]:
+            continue  # of a node in another process, which the same arguments start
         if flag in ('-p', '--param') and ':=' in value and name not in known:
             near = get_close_matches(name, known, n=1)
             hint = f'did you mean {near[0]}?' if near else '`ros2 param list` names those that there are'

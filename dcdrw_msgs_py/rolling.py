@@ -49,6 +49,20 @@ def phase(front: Pitched, rear: Pitched, psi1: Value, psi2: Value) -> Value:
     return p * (p < 1.0)  # the remainder of a tiny negative number is 1.0
 
 
+def rear_side(front_steps: int, rear_steps: int) -> int:
+    """0 where the even steps of the rear wheel are of the left foot, 1 where its odd ones are: in the order 1-4-2-3.
+
+    A wheel's strikes are of the left and the right foot in turn, and the front one begins with the left: after that
+    the right rear foot follows.
+
+    Args:
+        front_steps: taken by the front wheel when the rear one strikes.
+        rear_steps: which of its steps that strike is.
+
+    """
+    return (rear_steps + front_steps + 1) % 2
+
+
 def phi_pitch(front: Pitched, rear: Pitched) -> float:
     """The angle φ of a whole step, α1 + α2 [rad]: φ = p (α1 + α2)."""
     return front.alpha + rear.alpha

@@ -15,14 +15,15 @@ from dcdrw_control.sync.safety import Limits
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.yaml_file import yaml_text
-from dcdrw_sim.map.holding import METHODS, TARGETS, Margins, law, margins, plant
+from dcdrw_sim.map.holding import METHODS, TARGETS, Margins, eased, law, margins, plant, plants_near
 from dcdrw_sim.map.return_map import Complexes
 from dcdrw_tracker.gait.sync import SyncParams
 
 _EPILOG = """\
 hold: a force from strike to strike of the front wheel, u = force - gain (x - state) - gain_before u_before, with
 x = [θ1', θ2, θ2'] at the strike. Its gain comes from the exact derivative of the return map by the force. deadbeat
-brings θ2 home in one step; lqr weighs the error against the force.
+brings θ2 home in one step; lqr weighs the error against the force. The gain is then eased until the worst of the rigs
+within --uncertain is damped best.
 rear: a torque on the rear hub, behind a person of even pace: all of it at the edge of the band, critically damped.
 
 example:
@@ -65,6 +66,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     hold.add_argument('--method', choices=METHODS, default=METHODS[0], help='(default: %(default)s)')
     hold.add_argument(
+        '--uncertain',
+        type=number,
+        default=30.0,
+        metavar='PERCENT',
+        help='masses, damping and stiffness may each be so much less or more than the rig says (default: %(default)g)',
+    )
+    hold.add_argument(
         '--damping',
         type=number,
         default=0.0,
@@ -90,6 +98,8 @@ def run(options: argparse.Namespace) -> int:
         refuse_existing([options.out], options.force)
     if options.damping < 0.0:
         raise ValueError(f'--damping must be ≥ 0, got {options.damping:g}')
+    if not 0.0 <= options.uncertain < 100.0:
+        raise ValueError(f'--uncertain must be ≥ 0 and < 100, got {options.uncertain:g}')
     rig = chosen_params(options).rig.resolved()
     found = _rear(rig, options) if options.law == 'rear' else _hold(rig, options)
     shared = {name: flatten(rig)[name] for name in ('front.length', 'front.spokes', 'rear.length', 'rear.spokes', 'S0')}
@@ -102,8 +112,11 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _hold(rig: RigParams, options: argparse.Namespace) -> _Found:
-    about = plant(rig._replace(b=rig.b + options.damping), options.target, options.delay, options.max_force)
+    damped = rig._replace(b=rig.b + options.damping)
+    about = plant(damped, options.target, options.delay, options.max_force)
     chosen = law(about, options.method, 0.01 * SyncParams().band_percent, options.max_force)
+    if options.uncertain:
+        chosen = eased(chosen, plants_near(damped, 0.01 * options.uncertain, options.delay))
     state = chosen.state
     report = [
         f'aim           θ2 = {math.degrees(state.theta2):.3f}°, θ1′ = {state.omega1:.4f} rad/s, '
@@ -117,6 +130,7 @@ def _hold(rig: RigParams, options: argparse.Namespace) -> _Found:
         'hold.gain': [float(value) for value in chosen.gain],
         'hold.force': float(chosen.force),
         'hold.gain_before': float(chosen.gain_before),
+        'hold.middle': float(chosen.middle),
         'damping': float(options.damping),
         'limits.max_force': float(options.max_force),
     }

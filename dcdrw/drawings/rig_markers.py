@@ -3,6 +3,9 @@
 Everything lies in one frame, x horizontal and downhill, y left, z up, that goes along with the rig: its origin is the
 place on the slope below the midpoint of the hubs. All turns are about y, which rolls downhill: of the slope γ, of a
 wheel γ + θ. Sizes go with the wheels, so that a rig of any scale, and one without dimensions, looks alike.
+
+Where a person walks in front, footfalls are those of left and right feet in turn, beside the middle, and an arrow from
+the front hub shows the force on the person.
 """
 
 import math
@@ -14,8 +17,9 @@ from typing import Annotated, NamedTuple
 from dcdrw_msgs_py.diagnosis import Diagnosis, Level
 from dcdrw_msgs_py.quantity import Quantity
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams, Slope, StanceDistance, WheelShape
-from dcdrw_msgs_py.rolling import phi_pitch, regular_stance_distance, stance_distance_by_hubs
+from dcdrw_msgs_py.rolling import phi_pitch, rear_side, regular_stance_distance, stance_distance_by_hubs
 from dcdrw_msgs_py.samples import JointSample
+from dcdrw_msgs_py.topics import SIDES
 from dcdrw_tracker.gait.diagnostics import phase_text
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams, PhaseUpdate
 
@@ -27,6 +31,8 @@ Quaternion = tuple[float, float, float, float]
 FOOTFALLS = 6
 """Footfalls of each wheel that are shown."""
 COILS = 8
+FOOT_TRACK = 0.15
+"""A person's feet are drawn so far beside the middle, in lengths of a leg."""
 
 
 class MarkerParams(NamedTuple):
@@ -78,6 +84,7 @@ class RigView:
         self._force = math.nan
         self._stance = 0.0
         self._falls: dict[str, deque[int]] = {wheel: deque(maxlen=FOOTFALLS) for wheel in (FRONT, REAR)}
+        self._rear_side = 0
 
     def update(self, joints: JointSample) -> bool:
         """Take a sample; whether it is of use."""
@@ -90,6 +97,8 @@ class RigView:
         self._phase, self._force = update, joints.coupler.force
         for fall in update.footfalls:
             self._falls[fall.wheel].append(fall.steps)
+            if fall.wheel == REAR and self._falls[FRONT]:
+                self._rear_side = rear_side(self._falls[FRONT][-1], fall.steps)
         return True
 
     def _begin(self, joints: JointSample, update: PhaseUpdate) -> None:
@@ -112,17 +121,20 @@ class RigView:
             return self._stance + steps * self.params.front.step_length
         return steps * self.params.rear.step_length
 
-    def shapes(self, says: Diagnosis | None = None, synchronizer: str = '') -> tuple[Shape, ...]:
+    def shapes(
+        self, says: Diagnosis | None = None, synchronizer: str = '', person_force: float | None = None
+    ) -> tuple[Shape, ...]:
         """The drawing; nothing before the first sample.
 
         Args:
             says: what is known of the pair, the monitor's diagnosis say, to be written above the rig.
             synchronizer: what the synchronizer does; empty where there is none.
+            person_force: on the person in front, positive forward [N]; NaN: unknown; None where nobody walks.
 
         """
-        return tuple(self._draw(says, synchronizer)) if self._phase else ()
+        return tuple(self._draw(says, synchronizer, person_force)) if self._phase else ()
 
-    def _draw(self, says: Diagnosis | None, synchronizer: str) -> Iterator[Shape]:
+    def _draw(self, says: Diagnosis | None, synchronizer: str, person_force: float | None) -> Iterator[Shape]:
         assert self._phase
         params, phase, status = self.params, self._phase.phase, self._estimator.status()
         theta = {FRONT: phase.front.angle, REAR: phase.rear.angle}
@@ -165,19 +177,21 @@ class RigView:
                 tuple(point for tip in legs[1:] for point in ((0.0, 0.0, 0.0), tip)) + axle,
             )
             yield Shape(f'{wheel}_stance_leg', colour, 0.045 * size, centre, turn, ((0.0, 0.0, 0.0), legs[0]))
-            if self._falls[wheel]:
-                yield Shape(
-                    f'{wheel}_footfalls',
-                    colour,
-                    0.06 * size,
-                    place(0.0, y, 0.0),
-                    params.slope,
-                    tuple(
-                        (self.foot(wheel, n), end, 0.0)
-                        for n in self._falls[wheel]
-                        for end in (-0.05 * size, 0.05 * size)
-                    ),
-                )
+            feet = {f'{wheel}_footfalls': (y, list(self._falls[wheel]))}
+            if person_force is not None:
+                offset = self._rear_side if wheel == REAR else 0
+                feet = {
+                    f'{wheel}_{side_}_feet': (
+                        sign * FOOT_TRACK * size,
+                        [n for n in self._falls[wheel] if (n + offset) % 2 == odd],
+                    )
+                    for odd, (side_, sign) in enumerate(zip(SIDES, (1.0, -1.0), strict=True))
+                }
+            for name, (beside, falls) in feet.items():
+                if falls:
+                    ends = (-0.05 * size, 0.05 * size)
+                    points = tuple((self.foot(wheel, n), end, 0.0) for n in falls for end in ends)
+                    yield Shape(name, colour, 0.06 * size, place(0.0, beside, 0.0), params.slope, points)
         (x1, z1), (x2, z2) = hub[FRONT], hub[REAR]
         yield Shape(
             'coupler',
@@ -187,9 +201,21 @@ class RigView:
             params.slope + math.atan2(z2 - z1, x1 - x2),
             tuple(coupler_lines(math.hypot(x1 - x2, z1 - z2), 0.1 * size)),
         )
+        if person_force is not None and math.isfinite(person_force):
+            share = person_force / params.full_force
+            yield Shape(
+                'person_force',
+                force_colour(-share),
+                0.03 * size,
+                place(x1, 0.0, z1 + 0.3 * size),
+                params.slope,
+                tuple(arrow(max(-1.0, min(1.0, share)) * size, 0.08 * size)),
+            )
         lines = [phase_text(phase.phi.angle / phi_pitch(params.front, params.rear)), f'n = {phase.step_difference}']
         if math.isfinite(self._force):
             lines[1] += f', coupler {self._force:+.1f} N'
+        if person_force is not None and math.isfinite(person_force):
+            lines.append(f'on the person {person_force:+.1f} N')
         if synchronizer:
             lines.append(f'synchronizer {synchronizer}')
         if says:
@@ -243,6 +269,15 @@ def coupler_lines(length: float, width: float) -> Iterator[Point]:
     yield from line((0.6, -0.5), (0.4, -0.5), (0.4, -1.5), (0.6, -1.5))  # the cylinder, open to the rod
     yield from line((0.52, -0.6), (0.52, -1.4))
     yield from line((0.52, -1.0), (0.88, -1.0), (0.88, 0.0))
+
+
+def arrow(length: float, head: float) -> Iterator[Point]:
+    """An arrow along x, of either sign, as lines: points two by two."""
+    tip = (length, 0.0, 0.0)
+    back = length - math.copysign(min(head, abs(length)), length)
+    yield from ((0.0, 0.0, 0.0), tip)
+    for z in (-head, head):
+        yield from ((back, 0.0, z), tip)
 
 
 def force_colour(share: float) -> Colour:

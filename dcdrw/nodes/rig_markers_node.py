@@ -1,5 +1,6 @@
 """The node `rig_markers`: joint states in, the rig as markers for RViz and Foxglove out."""
 
+import math
 import sys
 from typing import Any
 
@@ -13,7 +14,7 @@ from dcdrw.drawings.rig_markers import MarkerParams, RigView, Shape, about_y
 from dcdrw_msgs_py.diagnosis import STATE, Diagnosis, Level
 from dcdrw_msgs_py.messages import JointSampleReader, diagnoses
 from dcdrw_msgs_py.node import Age, Parameters, advertise, follow_runs, listen, publish_diagnosis, run, steady_clock
-from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, RIG_MARKERS
+from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, LEG_PHASES, PERSON_FORCE, RIG_MARKERS
 
 STALE_AFTER = 1.0
 """Age of the last sample from which there are no data [s]; the drawing is then repeated so often, and says so."""
@@ -39,17 +40,25 @@ class RigMarkersNode(Node):
         self._header = Header(frame_id=params.frame)
         self._says: Diagnosis | None = None
         self._acts = ''
+        self._person_force = math.nan
         self._drawn_run = 0
         self._drawings = 0
         self._sample_age, self._drawn_age, self._says_age, self._acts_age = Age(), Age(), Age(), Age()
+        self._person_age = Age()
         publish_diagnosis(self, self._diagnose)
         self.create_timer(1.0 / params.redraw_rate, self._tick, clock=steady_clock())
         listen(self, DIAGNOSTICS, self._on_diagnostics)
+        listen(self, PERSON_FORCE, self._on_person_force)
+        listen(self, LEG_PHASES, lambda message: self._person_age.renew())
         follow_runs(self, self._reader.runs)
         listen(self, JOINT_STATES, self._on_joints)
 
     def _on_joints(self, message: Any) -> None:
         self._message = message
+
+    def _on_person_force(self, message: Any) -> None:
+        self._person_force = message.wrench.force.x
+        self._person_age.renew()
 
     def _on_diagnostics(self, message: Any) -> None:
         said = diagnoses(message)
@@ -83,7 +92,11 @@ class RigMarkersNode(Node):
         return taken
 
     def _draw(self) -> None:
-        shapes = self._view.shapes(self._caption(), self._acts if self._acts_age.seconds <= LIFETIME else '')
+        acts = self._acts if self._acts_age.seconds <= LIFETIME else ''
+        if self._person_age.seconds > LIFETIME:
+            self._person_force = math.nan
+        person_force = self._person_force if self._person_age.seconds <= LIFETIME else None
+        shapes = self._view.shapes(self._caption(), acts, person_force)
         if not shapes:
             return
         markers = [to_marker(shape, self._header) for shape in shapes]

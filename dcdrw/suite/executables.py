@@ -105,7 +105,7 @@ MARKERS = Executable(
     'rig_markers',
     'the rig as markers, for RViz and Foxglove',
     (MarkerParams,),
-    (JOINT_STATES, RUNS, DIAGNOSTICS),
+    (JOINT_STATES, RUNS, PERSON_FORCE, LEG_PHASES, DIAGNOSTICS),
     (RIG_MARKERS, DIAGNOSTICS),
 )
 

@@ -12,6 +12,7 @@ import numpy as np
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.lone_wheels import LoneWheels
 from dcdrw.suite.parameter_file import TrialParams
+from dcdrw.trials.acts import Acts
 from dcdrw.trials.course import Course, Gap
 from dcdrw.trials.motion import MotionTable, Sink
 from dcdrw_msgs_py.diagnosis import PairState
@@ -80,6 +81,8 @@ class Analysis(NamedTuple):
     """What of the recording was left out, for it is damaged."""
     notes: tuple[str, ...] = ()
     """What else is not as it should be with the recording."""
+    acts: Acts = ()
+    """What the synchronizer did, where one was recorded."""
 
     @property
     def pitch(self) -> float:

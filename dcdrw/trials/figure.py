@@ -1,4 +1,4 @@
-"""The picture of a trial: stance angles, phase difference, gait diagram and coupler force against time."""
+"""The picture of a trial: stance angles, phase difference, gait, coupler force and synchronizer against time."""
 
 import math
 from itertools import pairwise
@@ -10,10 +10,24 @@ import numpy as np
 
 from dcdrw.trials.analysis import Analysis
 from dcdrw.trials.motion import MotionTable
+from dcdrw_control.sync.safety import State
 from dcdrw_msgs_py.rig import FRONT, REAR
+from dcdrw_msgs_py.rolling import rear_side
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.values import Floats
-from dcdrw_sim.figures.style import BAND, BLACK, COLUMN, WHEELS, for_print, new_figure, save
+from dcdrw_sim.figures.style import (
+    BAND,
+    BLACK,
+    COLUMN,
+    GREEN,
+    ORANGE,
+    SKY,
+    VERMILION,
+    WHEELS,
+    for_print,
+    new_figure,
+    save,
+)
 
 SCREEN = 9.0
 """Width on a screen [inch]; on a printed page its letters are of POINTS still."""
@@ -22,6 +36,16 @@ CLOSE = 50
 LETTERS = 15
 """Letters of POINTS that an inch of a title's line holds."""
 _FORCE = '#555555'
+ACTS = 0.8
+"""Height of the panel of the synchronizer's states, as those of the others in `trial_figure`."""
+STATES = {
+    State.DISABLED: '0.8',
+    State.ARMED: SKY,
+    State.ACTIVE: GREEN,
+    State.RAMP_DOWN: ORANGE,
+    State.FAULT: VERMILION,
+}
+"""Colours of the synchronizer's states."""
 FEET = {1: '1 left', 2: '2 right', 3: '3 left', 4: '4 right'}
 """Of the person in front, and of the robot behind."""
 
@@ -53,22 +77,24 @@ def trial_figure(trial: Analysis, title: str, width: float = SCREEN) -> Any:
     force_known = bool(np.isfinite(course.motion.coupler_force).any())
     title = _in_lines(title, width)
     height = 4.2 + 0.31 * width if force_known else 3.5 + 0.26 * width
+    drawn = [_draw_angles, _draw_phase, _draw_feet if course.person else _draw_gait]
+    ratios = [3.0, 3.0, 1.3]
+    if force_known:
+        drawn.append(_draw_force)
+        ratios.append(2.0)
+    if trial.acts:
+        drawn.append(_draw_acts)
+        ratios.append(ACTS)
+        height *= 1.0 + ACTS / sum(ratios)
     figure = new_figure(width, height + 0.16 * (title.count('\n') + 1))
-    panels = 4 if force_known else 3
-    angles, phase, gait, *force = figure.subplots(panels, 1, sharex=True, height_ratios=(3, 3, 1.3, 2)[:panels])
-    _draw_angles(angles, course)
-    _draw_phase(phase, course)
-    if course.person:
-        _draw_feet(gait, course)
-    else:
-        _draw_gait(gait, course)
-    for axes in force:
-        _draw_force(axes, course)
-    last = force[0] if force else gait
+    panels = figure.subplots(len(drawn), 1, sharex=True, height_ratios=ratios)
+    for draw, axes in zip(drawn, panels, strict=True):
+        draw(axes, course)
+    last = panels[-1]
     last.set_xlabel('time [s]')
     if len(course.time):
         last.set_xlim(0.0, max(float(course.time[-1]), 1e-3))
-    for axes in (angles, phase, gait, *force):
+    for axes in panels:
         axes.spines[['top', 'right']].set_visible(False)
         _shade_gaps(axes, course)
     figure.suptitle(title)
@@ -230,11 +256,11 @@ def _draw_feet(axes: Any, course: _Course) -> None:
 
 
 def _rear_side(front: list[tuple[float, int]], rear: list[tuple[float, int]]) -> int:
-    """0 where the rear wheel's even steps are of the left foot, 1 where its odd ones are: in the order 1-4-2-3."""
+    """`rear_side` by the first footfall that tells it."""
     for second, steps in rear:
         before = [number for begin, number in front if begin <= second]
         if before:
-            return (steps + before[-1] + 1) % 2  # the right rear foot follows the left front one
+            return rear_side(before[-1], steps)
     return 0
 
 
@@ -253,4 +279,21 @@ def _draw_force(axes: Any, course: _Course) -> None:
         linewidth=course.fine,
         label=f'at most {peak:.1f} N, {rms:.1f} N rms, + forward',
     )
+    _legend(axes)
+
+
+def _draw_acts(axes: Any, course: _Course) -> None:
+    """A bar for each state of the synchronizer, from when it was told on."""
+    start_ns, end = int(course.motion.stamp_ns[0]) if len(course.time) else 0, max(course.time, default=0.0)
+    told = [(max((stamp_ns - start_ns) / SECOND, 0.0), state) for stamp_ns, state in course.trial.acts]
+    for state, colour in STATES.items():
+        bars = [
+            (begin, until - begin)
+            for (begin, said), (until, _) in pairwise([*told, (end, '')])
+            if said == state.value and begin < until
+        ]
+        axes.broken_barh(bars, (0.0, 1.0), color=colour, linewidth=0, label=state.value if bars else None)
+    axes.set_yticks([])
+    axes.set_ylim(0.0, 1.0)
+    axes.set_ylabel('synchronizer', rotation=0, ha='right', va='center')
     _legend(axes)

@@ -13,6 +13,7 @@ from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.recorded_runs import recorded_runs, with_runs
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
+from dcdrw.trials.acts import Clock, recorded_acts
 from dcdrw.trials.agreement import Agreement, Comparison
 from dcdrw.trials.analysis import Analysis, analyze
 from dcdrw.trials.figure import draw_trial
@@ -59,14 +60,16 @@ def read_trial(
         if rig:
             params = read_parameter_file(rig, params, space)
         comparison = Comparison(recording, phi_pitch(params.sync.front, params.sync.rear), space)
-        trial = analyze(batches, params, [*sinks, comparison])
+        clock = Clock()
+        trial = analyze(clock.watch(batches), params, [*sinks, comparison])
         if trial.unreadable and not len(trial.motion.stamp_ns):
             mend = (
                 ' (front_joint and rear_joint in a rig file name them)' if trial.unreadable.startswith('joint') else ''
             )
             raise ValueError(f'{path}: {name}: {trial.unreadable}{mend}')
         agreements = comparison.agreements()
-        return trial._replace(damage=tuple(recording.damage), notes=tuple(recording.notes)), agreements
+        acts = recorded_acts(recording, space, clock)
+        return trial._replace(damage=tuple(recording.damage), notes=tuple(recording.notes), acts=acts), agreements
 
 
 class SampleTable:

@@ -130,6 +130,13 @@ class Safety:
         self.force = max(-most, min(most, self.force))
         return self.force
 
+    def let_go(self, now: float) -> float:
+        """No force at a time [s] of a steady clock, whatever the state, and none is left to ramp down."""
+        self._now, self.force = max(now, self._now), 0.0
+        if self.state is State.RAMP_DOWN:
+            self.state = State.DISABLED
+        return self.force
+
     def _leave(self) -> None:
         if self.state is State.ACTIVE:
             self.state = State.RAMP_DOWN

@@ -34,7 +34,7 @@ class SynchronizerParams(NamedTuple):
     rate: Annotated[float, Quantity('commands per second', 'Hz', low=50.0, high=2000.0)] = 500.0
     stale_after: Annotated[
         float, Quantity('without a sample for this long the input is stale: a fault', 's', above=0.0, high=0.08)
-    ] = 0.07
+    ] = 0.055
     enable_timeout: EnableTimeout = ENABLE_TIMEOUT
     stall_after: Annotated[
         float, Quantity('a wheel without a strike for this long has stalled: a fault', 's', above=0.0, high=10.0)
@@ -73,6 +73,7 @@ class Synchronizer:
 
     _last: PhaseSample | None
     _heard: float
+    _was_stale: bool
     _asked: float
     _struck: list[float]
 
@@ -96,7 +97,7 @@ class Synchronizer:
         self.safety.limits = params.limits
 
     def enable(self, now: float, on: bool) -> None:
-        """Take a heartbeat; false ends it at once."""
+        """Take a heartbeat that came at a time; false ends it at once."""
         self._heartbeat.take(now, on)
 
     def refuse(self) -> None:
@@ -109,7 +110,7 @@ class Synchronizer:
         self.safety.trip(fault)
 
     def update(self, sample: PhaseSample, now: float) -> None:
-        """Take the next sample."""
+        """Take the next sample, which came at a time."""
         values = (*sample.front, *sample.rear)
         if not all(map(math.isfinite, values)):
             self.refuse()
@@ -135,16 +136,23 @@ class Synchronizer:
         self._last, self._heard = sample, now
 
     def command(self, now: float) -> Command:
-        """The command at a time."""
-        if now - self._heard > self.params.stale_after:
+        """The command at a time.
+
+        A silent input takes the force away at once, and is a fault when it is silent still the next time: a process
+        that could not run for a while asks for a command before it has read what waits.
+        """
+        is_stale = now - self._heard > self.params.stale_after
+        if is_stale and self._was_stale:
             self.safety.trip('stale')
-        if now - min(self._struck) > self.params.stall_after:
+        self._was_stale = is_stale
+        has_stalled = not is_stale and now - min(self._struck) > self.params.stall_after
+        if has_stalled:
             self.safety.trip('stalled')
         wanted = self._law.wanted(now)
         ready = (
             self.params.law != 'off'
-            and now - self._heard <= self.params.stale_after
-            and now - min(self._struck) <= self.params.stall_after
+            and not is_stale
+            and not has_stalled
             and math.isfinite(wanted)
             and self._last is not None
             and abs(self._last.step_difference) <= MOST_STEPS_APART
@@ -155,7 +163,7 @@ class Synchronizer:
         else:
             rate = self._coupler_rate()
             wanted += self.params.damping * rate if self.params.damping else 0.0
-        effort = self.safety.command(now, wanted, rate)
+        effort = self.safety.let_go(now) if is_stale else self.safety.command(now, wanted, rate)
         self._law.act(now, effort)
         if math.isfinite(self._asked) and math.isfinite(rate):
             self.work += abs(effort * rate) * (now - self._asked)
@@ -167,6 +175,7 @@ class Synchronizer:
         """Know nothing of the input any more."""
         self._last = None
         self._heard = -math.inf
+        self._was_stale = True
         self._asked = math.nan
         self._struck = [-math.inf, -math.inf]
         self._law.reset()

@@ -15,7 +15,7 @@ from dcdrw_control.sync.safety import State
 from dcdrw_control.sync.synchronizer import Command, Synchronizer, SynchronizerParams
 from dcdrw_msgs_py.diagnosis import Diagnosis
 from dcdrw_msgs_py.messages import PhaseSampleReader, to_stamp
-from dcdrw_msgs_py.node import Parameters, advertise, listen, publish_diagnosis, run, steady_clock
+from dcdrw_msgs_py.node import Parameters, advertise, listen_aged, publish_diagnosis, run, steady_clock
 from dcdrw_msgs_py.samples import PhaseSample
 from dcdrw_msgs_py.topics import (
     COUPLER_FORCE_COMMAND,
@@ -46,8 +46,8 @@ class SynchronizerNode(Node):
         self._state = advertise(self, SYNCHRONIZER_STATE)
         self.create_service(Trigger, '~/stop', self._on_stop)
         self.create_service(Trigger, '~/reset_fault', self._on_reset_fault)
-        listen(self, ENABLE, lambda message: self._core.enable(time.monotonic(), message.data))
-        listen(self, PHASE_STATE, self._on_message, take_sample=self._on_phase)
+        listen_aged(self, ENABLE, lambda message, age: self._core.enable(time.monotonic() - age, message.data))
+        listen_aged(self, PHASE_STATE, self._on_message, take_sample=self._on_phase)
         publish_diagnosis(self, self._diagnose)
         self.create_timer(1.0 / settings.value.rate, self._tick, clock=steady_clock())
         self.create_timer(WATCH_SECONDS, self._watch, clock=steady_clock())
@@ -61,17 +61,17 @@ class SynchronizerNode(Node):
     def _configure(self, params: SynchronizerParams) -> None:
         self._core.configure(params)
 
-    def _on_message(self, message: Any) -> None:
+    def _on_message(self, message: Any, age: float) -> None:
         try:
             sample = self._reader.read(message)
         except ValueError as error:
             self._core.refuse()
             self.get_logger().warning(f'phase_state: {error}', throttle_duration_sec=1.0)
             return
-        self._on_phase(sample)
+        self._on_phase(sample, age)
 
-    def _on_phase(self, sample: PhaseSample) -> None:
-        self._core.update(sample, time.monotonic())
+    def _on_phase(self, sample: PhaseSample, age: float = 0.0) -> None:
+        self._core.update(sample, time.monotonic() - age)
 
     def _tick(self) -> None:
         self._publish(self._core.command(time.monotonic()))

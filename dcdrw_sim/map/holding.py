@@ -5,22 +5,25 @@ A force that comes late by d acts as B_old u_before + B_new u: the one before st
 The law is u = u* − K x − κ (u_before − u*).
 """
 
+import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.polynomial import Polynomial
 from scipy.linalg import solve_discrete_are
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.rolling import phase
 from dcdrw_msgs_py.values import Floats
 from dcdrw_sim.map.return_map import Complexes, FixedPoint, ReturnMap, SectionState, spectrum
 from dcdrw_sim.map.variation import jump, propagators, rates
 from dcdrw_sim.model.dynamics import State
 from dcdrw_sim.motion.pair import Segment
-from dcdrw_sim.motion.trajectory import run
+from dcdrw_sim.motion.trajectory import Run, run
 
 Target = Literal['cycle', 'time', 'angle']
 TARGETS: tuple[Target, ...] = get_args(Target)
@@ -35,6 +38,8 @@ EDGE_SAMPLES = 40
 """Gains or delays that are tried along the way; between two of them the edge is found exactly."""
 EDGE = 1e-4
 """To so much of the range of the search."""
+SWING_SAMPLES = 1001
+"""Times within a step at which its swing is looked at."""
 WHOLE_STEP = 0.999
 """Delays are looked at up to this fraction of a step's time; a longer one would be that of another step."""
 
@@ -53,6 +58,8 @@ class Plant(NamedTuple):
     """B_old, shape (3,) [per N]."""
     by_new: Floats
     """B_new, shape (3,) [per N]."""
+    middle: float
+    """Of the swing of p − 0.5 within a step on the limit cycle [steps]."""
 
     def closed(self, law: 'Law', factor: float = 1.0) -> Complexes:
         """Multipliers of the loop with so many times the gain of a law, the largest first, shape (4,)."""
@@ -72,6 +79,8 @@ class Law(NamedTuple):
     """Gains on θ1′ [N·s/rad], θ2 [N/rad] and θ2′ [N·s/rad], shape (3,)."""
     gain_before: float
     """Gain on the force that was held before."""
+    middle: float
+    """Of the swing of p − 0.5 within a step, where the pair is at its aim [steps]."""
 
 
 class Margins(NamedTuple):
@@ -128,7 +137,49 @@ def law(plant: Plant, method: Method = 'deadbeat', band: float = 0.06, limit: fl
         R = np.array([[1.0 / limit**2]])
         P = solve_discrete_are(A, B, Q, R)
         gain = np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A)[0]
-    return Law(plant.point.state, plant.force, gain[:3], float(gain[3]))
+    return Law(plant.point.state, plant.force, gain[:3], float(gain[3]), plant.middle)
+
+
+def plants_near(rig: RigParams, share: float, delay: float = 0.0) -> list[Plant]:
+    """The plants of `corners`, of those that have a limit cycle; the delay [s] is that of `plant`."""
+    found = []
+    for corner in corners(rig, share):
+        with suppress(ValueError):
+            found.append(plant(corner, delay=delay))
+    return found
+
+
+def eased(chosen: Law, plants: Sequence[Plant]) -> Law:
+    """A law with so much less gain that the worst of several rigs is damped best.
+
+    A loop's largest multiplier is left aside: it is that of the pair's own speed, which a held force hardly moves.
+
+    Args:
+        chosen: the law.
+        plants: one for each rig; where there is none, the law stays as it is.
+
+    """
+    if not plants:
+        return chosen
+
+    def worst(factor: float) -> float:
+        return max(float(abs(plant.closed(chosen, factor)[1])) for plant in plants)
+
+    factor = float(minimize_scalar(worst, bounds=(0.0, 1.0), method='bounded').x)
+    return chosen._replace(gain=factor * chosen.gain, gain_before=factor * chosen.gain_before)
+
+
+def corners(rig: RigParams, share: float) -> list[RigParams]:
+    """The eight rigs whose masses, damping and stiffness are each such a share less, or more."""
+    return [
+        rig._replace(
+            front=rig.front._replace(mass=m * rig.front.mass),
+            rear=rig.rear._replace(mass=m * rig.rear.mass),
+            b=b * rig.b,
+            k=k * rig.k,
+        )
+        for m, b, k in itertools.product((1.0 - share, 1.0 + share), repeat=3)
+    ]
 
 
 def margins(plant: Plant, chosen: Law) -> Margins:
@@ -192,10 +243,11 @@ def _target(rig: RigParams, target: Target, limit: float) -> tuple[FixedPoint, f
 def _with_delay(rig: RigParams, point: FixedPoint, force: float, delay: float) -> Plant:
     if not 0.0 <= delay < point.period:
         raise ValueError(f'the delay must be ≥ 0 and shorter than a step, {point.period:.3f} s, got {delay:g} s')
-    if delay == 0.0:
-        return Plant(rig, point, force, 0.0, np.zeros(3), point.by_force)
     rig = ReturnMap(rig).rig
     motion = run(rig, State(rig.front.alpha, *point.state), strikes=3, external_force=force)
+    middle = _middle(motion, point.period)
+    if delay == 0.0:
+        return Plant(rig, point, force, 0.0, np.zeros(3), point.by_force, middle)
     segments = _cut(motion.segments, delay)
     steps = propagators(rig, segments, force)
     deviation = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
@@ -207,7 +259,14 @@ def _with_delay(rig: RigParams, point: FixedPoint, force: float, delay: float) -
         deviation = step @ deviation
     flow = rates(rig, motion.strikes[-1].state, rig.S0, force)
     by_old = (deviation - flow / flow[0] * deviation[0])[1:4]
-    return Plant(rig, point, force, delay, by_old, point.by_force - by_old)
+    return Plant(rig, point, force, delay, by_old, point.by_force - by_old, middle)
+
+
+def _middle(motion: Run, period: float) -> float:
+    """The middle of the swing of p − 0.5 within a step [steps]."""
+    rig, at = motion.rig, motion.at(np.linspace(0.0, period, SWING_SAMPLES))
+    error = phase(rig.front, rig.rear, at.rotation1, at.rotation2) - 0.5
+    return 0.5 * float(error.min() + error.max())
 
 
 def _cut(segments: list[Segment], time: float) -> list[Segment]:

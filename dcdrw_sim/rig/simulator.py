@@ -37,7 +37,7 @@ class SimulatorParams(NamedTuple):
     drop_percent: Annotated[float, Quantity('samples lost at random', '%', low=0.0, high=100.0, live=True)] = 0.0
     seed: Annotated[int, Quantity('of noise and losses', low=0)] = 0
     command_timeout: Annotated[float, Quantity('a command older than this counts as 0', 's', above=0.0, live=True)] = (
-        0.08
+        0.04
     )
     person: PersonParams = PersonParams()
 

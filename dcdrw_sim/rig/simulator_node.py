@@ -14,7 +14,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from dcdrw_msgs_py.diagnosis import STATE, STEP_DIFFERENCE, Diagnosis, Level, SourceState
 from dcdrw_msgs_py.messages import JointSampleWriter, run_message, to_stamp
-from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, publish_diagnosis, run, steady_clock
+from dcdrw_msgs_py.node import Age, Parameters, advertise, listen_aged, publish_diagnosis, run, steady_clock
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.topics import (
@@ -72,7 +72,7 @@ class SimulatorNode(Node):
         self._clock_publisher = advertise(self, CLOCK) if params.publish_clock else None
         self._person_force = advertise(self, PERSON_FORCE) if params.person.walks else None
         for topic in self._commands:
-            listen(self, topic, partial(self._on_command, topic))
+            listen_aged(self, topic, partial(self._on_command, topic))
         self.create_service(Trigger, '~/reset', self._on_reset)
         self.create_service(SetBool, '~/pause', self._on_pause)
         self._report = publish_diagnosis(self, self._diagnose)
@@ -163,14 +163,16 @@ class SimulatorNode(Node):
         self._timeline.configure(params.rate, params.real_time_factor, self._now())
         self._timer.timer_period_ns = round(self._period() * SECOND)
 
-    def _on_command(self, topic: Topic, message: Any) -> None:
+    def _on_command(self, topic: Topic, message: Any, age: float) -> None:
+        if age > self._settings.value.command_timeout:  # it waited here while this process could not run
+            return
         try:
             self._obey(topic, message.data)
         except ValueError as error:
             self._refused_commands += 1
             self.get_logger().warning(f'{topic.name}: {error}', throttle_duration_sec=1.0)
             return
-        self._commands[topic].renew()
+        self._commands[topic].renew(age)
 
     def _obey(self, topic: Topic, value: float) -> None:
         """Let a command act on the rig from now on."""

@@ -68,7 +68,7 @@ def closed_loop(phase, controller, seconds=10.0):
     return np.array(rows)
 
 
-gains = HoldGains(tuple(chosen.state), tuple(chosen.gain), chosen.force, chosen.gain_before)
+gains = HoldGains(tuple(chosen.state), tuple(chosen.gain), chosen.force, chosen.gain_before, chosen.middle)
 for phase in (0.1, 0.216, 0.7):
     for name, controller in (('passive', None), ('deadbeat', HoldLaw(gains, rig.front.alpha, rig.rear.alpha))):
         rows = closed_loop(phase, controller)

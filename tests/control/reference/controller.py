@@ -1,7 +1,9 @@
 """joint_trajectory_controller as its documentation tells: what it accepts, and what it makes the joints do.
 
 With `interpolate_from_desired_state`, a new trajectory takes the old one's place at once: until its first point the
-joints go by a cubic spline from what was desired then, and by cubic splines from point to point later.
+joints go by a cubic spline from what was desired then, and by cubic splines from point to point later. What was desired
+is what was commanded last, for the next cycle, dated one cycle back: so the code has it
+(joint_trajectory_controller.cpp: last_commanded_time_, and trajectory.cpp: set_point_before_trajectory_msg).
 """
 
 import numpy as np
@@ -12,7 +14,9 @@ from dcdrw_control.reference.plan import TICK, Trajectory
 class Controller:
     """Follows trajectories exactly; times in seconds."""
 
-    def __init__(self, joints: int) -> None:
+    def __init__(self, joints: int, period: float = 0.0) -> None:
+        """Take the number of joints, and the time from cycle to cycle [s]."""
+        self._period = period
         self._times = np.zeros(1)
         self._positions, self._speeds = np.zeros((1, joints)), np.zeros((1, joints))
 
@@ -25,7 +29,7 @@ class Controller:
         assert times[0] > now, 'what is past is not done any more'
         assert not trajectory.speeds[-1].any(), 'allow_nonzero_velocity_at_trajectory_end is false'
         position, speed = self.state(now)
-        self._times = np.concatenate([[now], times])
+        self._times = np.concatenate([[now - self._period], times])
         self._positions = np.vstack([position, trajectory.positions])
         self._speeds = np.vstack([speed, trajectory.speeds])
 

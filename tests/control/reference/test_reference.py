@@ -86,6 +86,17 @@ def test_behind_an_even_walk_the_joints_are_those_of_the_table_a_quarter_stride_
     assert speed == pytest.approx(0.9 * TABLE.slopes(ahead).ravel(), abs=5e-2)
 
 
+def test_the_controllers_own_way_to_date_what_it_commanded_costs_no_more_than_a_cycle():
+    period = 0.002
+    ideal, real = World(approach=0.2, ramp_strides=1.0), World(approach=0.2, ramp_strides=1.0)
+    real.controller = Controller(len(real.core.joints), period)
+    for world in (ideal, real):
+        world.walk(4.0)
+    off = np.abs(np.array(real.positions) - ideal.positions).max()
+    assert 0.0 < off <= period * ideal.params.max_speed
+    assert np.abs(real.speeds).max() <= ideal.params.max_speed
+
+
 def test_its_feet_fall_in_the_order_1_4_2_3_a_quarter_stride_before_the_persons(even):
     status = even.core.status()
     assert (status.order.wrong, status.order.falls > 15) == (0, True)

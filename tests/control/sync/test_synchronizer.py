@@ -13,7 +13,7 @@ from dcdrw_control.sync.synchronizer import Synchronizer, SynchronizerParams
 from dcdrw_msgs_py.quantity import check
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.samples import JointSample, PhaseSample, Turn
-from dcdrw_sim.map.holding import law, plant
+from dcdrw_sim.map.holding import Law, corners, eased, law, plant, plants_near
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.model.start import start
@@ -28,9 +28,12 @@ RATE = 500.0
 
 
 def params_for(rig: RigParams, name: str = 'hold') -> SynchronizerParams:
-    found = law(plant(rig))
-    gains = HoldGains(tuple(map(float, found.state)), tuple(map(float, found.gain)), found.force, found.gain_before)
-    return SynchronizerParams(law=name, hold=gains)
+    return SynchronizerParams(law=name, hold=gains_of(law(plant(rig))))
+
+
+def gains_of(found: Law) -> HoldGains:
+    state, gain = (tuple(map(float, values)) for values in (found.state, found.gain))
+    return HoldGains(state, gain, found.force, found.gain_before, found.middle)
 
 
 HOLD = params_for(PAPER)
@@ -76,6 +79,16 @@ def test_on_its_limit_cycle_the_pair_needs_no_force():
     assert max(abs(force) for _, _, force, _, _ in rows[-round(5.0 * RATE) :]) < 0.1
 
 
+@pytest.mark.parametrize(('corner', 'percent'), [(4, 10), (5, 50), (5, 70), (1, 70), (2, 90)])
+def test_a_rig_that_is_not_the_one_that_was_told_comes_into_step_all_the_same(corner, percent):
+    """Masses, b and k each 30 % less or more: its swing lies about 50 % elsewhere, and the aim goes there."""
+    rig = corners(PAPER.resolved(), 0.3)[corner]
+    params = SynchronizerParams(law='hold', hold=gains_of(eased(law(plant(PAPER)), plants_near(PAPER.resolved(), 0.3))))
+    rows = list(walk(rig, params, percent / 100.0, 15.0))
+    assert steps(rows) <= (0 if percent == 50 else 5)
+    assert max(abs(force) for _, _, force, _, _ in rows[-round(3.0 * RATE) :]) < 0.2
+
+
 def test_with_law_off_it_stays_armed_and_commands_nothing():
     rows = list(walk(PAPER, params_for(PAPER, 'off'), 0.2, 3.0))
     assert {force for _, _, force, _, _ in rows} == {0.0}
@@ -112,9 +125,10 @@ def test_each_bad_sample_has_its_fault_and_ends_the_force_at_once(change, fault)
 
 def test_silence_is_a_fault_within_100_ms_and_a_wheel_without_strikes_is_one():
     core, _, now = pushing()
-    core.enable(now + 0.08, True)
-    command = core.command(now + 0.08)
-    assert (command.force, core.safety.reason) == (0.0, 'stale')
+    for late in (0.08, 0.082):  # no force at once, and a fault when nothing was waiting to be read
+        core.enable(now + late, True)
+        assert core.command(now + late).force == 0.0
+    assert core.safety.reason == 'stale'
     core, sample, now = pushing()
     for tick in range(1200):
         now += 0.002
@@ -122,6 +136,25 @@ def test_silence_is_a_fault_within_100_ms_and_a_wheel_without_strikes_is_one():
         core.enable(now, True)
         command = core.command(now)
     assert (command.force, core.safety.reason) == (0.0, 'stalled')
+
+
+def test_a_process_that_could_not_run_reads_what_waited_before_it_judges():
+    core, sample, now = pushing()
+    core.enable(now + 0.3, True)
+    assert core.command(now + 0.3).force == 0.0
+    core.update(sample._replace(stamp_ns=sample.stamp_ns + 300_000_000), now + 0.3)
+    forces = [core.command(now + 0.3 + 0.002 * tick).force for tick in range(1, 6)]
+    assert core.safety.state is State.ACTIVE
+    assert [abs(force) for force in forces] == sorted(abs(force) for force in forces)
+    assert abs(forces[0]) <= HOLD.limits.max_slew * 0.002 * (1 + 1e-9)
+
+
+def test_an_input_that_falls_silent_ends_the_ramp_at_once():
+    core, _, now = pushing()
+    core.safety.stop()
+    assert core.command(now + 0.002).force != 0.0
+    command = core.command(now + 0.08)
+    assert (command.force, core.safety.state) == (0.0, State.DISABLED)
 
 
 def test_a_heartbeat_that_ends_ramps_the_force_down():

@@ -53,6 +53,27 @@ def test_a_turn_rolls_downhill(turn):
     np.testing.assert_allclose(Rotation.from_quat(about_y(math.pi / 2)).apply([0, 0, 1]), [1, 0, 0], atol=1e-12)
 
 
+def test_a_person_s_trial_shows_left_and_right_feet_in_the_order_1_4_2_3_and_the_force_on_the_person():
+    view, falls = view_of(RigParams(k=16.0, b=10.0)), []
+    for sample in samples(RigParams(k=16.0, b=10.0), 12.0):
+        view.update(sample)
+        shapes = {shape.name: shape for shape in view.shapes(person_force=8.0)}
+        for foot, name in enumerate(('front_left', 'front_right', 'rear_left', 'rear_right'), start=1):
+            if shape := shapes.get(f'{name}_feet'):
+                ahead = max(x for x, _, _ in shape.points)
+                if (foot, ahead) not in falls:
+                    falls.append((foot, ahead))
+                assert math.copysign(1.0, shape.position[1]) == (1.0 if foot % 2 else -1.0)
+    feet = [foot for foot, _ in falls][-12:]
+    assert all((one, other) in ((1, 4), (4, 2), (2, 3), (3, 1)) for one, other in pairwise(feet))
+    assert not any(name.endswith('_footfalls') for name in shapes)
+    forward = shapes['person_force'].points
+    backward = next(shape for shape in view.shapes(person_force=-8.0) if shape.name == 'person_force').points
+    assert forward[1][0] == -backward[1][0] > 0.0
+    assert 'on the person +8.0 N' in shapes['label'].text
+    assert 'person_force' not in {shape.name for shape in view.shapes(person_force=math.nan)}
+
+
 @pytest.mark.parametrize('rig', [RigParams(), UNEQUAL], ids=['equal', 'unequal'])
 def test_hubs_are_as_far_apart_as_the_coupler_is_long_and_feet_stand_on_the_slope(rig):
     view = view_of(rig)

@@ -76,6 +76,17 @@ def test_a_persons_trial_shows_four_feet_in_the_order_1_4_2_3_and_the_force_on_t
     assert force.get_legend().get_texts()[0].get_text().startswith('at most 3.0 N, 3.0 N rms')
 
 
+def test_the_synchronizers_states_are_drawn_from_when_they_were_told_to_the_next():
+    start_ns = WALK[0].stamp_ns
+    acts = ((start_ns - 10**9, 'disabled'), (start_ns + 2 * 10**9, 'active'), (start_ns + 5 * 10**9, 'fault'))
+    drawn = trial_figure(analyze([batch(WALK)], TrialParams())._replace(acts=acts), '').axes
+    panel = next(axes for axes in drawn if axes.get_ylabel() == 'synchronizer')
+    assert [text.get_text() for text in panel.get_legend().get_texts()] == ['disabled', 'active', 'fault']
+    begins = sorted(path.vertices[:, 0].min() for bars in panel.collections for path in bars.get_paths())
+    assert begins[:3] == pytest.approx([0.0, 2.0, 5.0], abs=0.1)
+    assert 'synchronizer' not in [axes.get_ylabel() for axes in figure(WALK).axes]
+
+
 def test_a_source_without_force_has_no_empty_panel():
     assert [axes.get_ylabel() for axes in figure(WALK).axes][-1] == 'coupler force [N]'
     panels = figure(WALK, force=np.nan).axes

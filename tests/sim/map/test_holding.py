@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dcdrw_sim.map.holding import METHODS, law, margins, plant
+from dcdrw_sim.map.holding import METHODS, eased, law, margins, plant, plants_near
 from dcdrw_sim.map.return_map import ReturnMap, SectionState
 from dcdrw_sim.model.dynamics import State
 from dcdrw_sim.model.presets import preset
@@ -54,6 +54,21 @@ def test_the_loop_is_stable_up_to_its_margins_and_not_beyond(method):
     assert abs(found.closed(chosen)[0]) < 1.0
     assert edge.gain > 1.5
     assert abs(found.closed(chosen, 0.99 * edge.gain)[0]) < 1.0 < abs(found.closed(chosen, 1.01 * edge.gain)[0])
+
+
+@pytest.mark.parametrize('delay', [0.0, 0.05])
+def test_an_eased_law_damps_the_worst_of_its_rigs_better(delay):
+    chosen, rigs = law(plant(PAPER, delay=delay)), plants_near(PAPER, 0.3, delay)
+    assert len(rigs) == 8
+    milder = eased(chosen, rigs)
+    worst, before = (max(abs(rig.closed(one)[1]) for rig in rigs) for one in (milder, chosen))
+    assert worst < 0.37 < 0.5 < before
+    assert np.array(milder.gain) / chosen.gain == pytest.approx([milder.gain[1] / chosen.gain[1]] * 3)
+    assert eased(chosen, []) == chosen
+
+
+def test_the_middle_of_the_papers_swing_is_that_of_its_extremes():
+    assert 100.0 * plant(PAPER).middle + 50.0 == pytest.approx(0.5 * (47.19 + 52.70), abs=0.01)
 
 
 def test_targets_are_met_by_their_steady_force():

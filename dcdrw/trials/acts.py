@@ -1,0 +1,50 @@
+"""What the synchronizer did in a recorded trial, and when, by the stamps of the joint states. Knows no ROS."""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from dcdrw.recordings.joint_batch import JointBatch
+from dcdrw.recordings.recording import Recording
+from dcdrw_msgs_py.topics import SYNCHRONIZER_STATE
+
+Acts = tuple[tuple[int, str], ...]
+"""Stamps, and what the synchronizer did from then on."""
+
+
+class Clock:
+    """Turns times of recording into stamps of the joint states: a state of the synchronizer has none of its own."""
+
+    def __init__(self) -> None:
+        self._log_ns: list[int] = []
+        self._stamp_ns: list[int] = []
+
+    @property
+    def runs(self) -> bool:
+        """Whether both times are known."""
+        return bool(self._log_ns)
+
+    def watch(self, batches: Iterable[JointBatch]) -> Iterator[JointBatch]:
+        """The same batches, of each of which a message is remembered."""
+        for batch in batches:
+            if len(batch.log_ns) and len(batch.stamp_ns):
+                self._log_ns.append(int(batch.log_ns[-1]))
+                self._stamp_ns.append(int(batch.stamp_ns[-1]))
+            yield batch
+
+    def stamps(self, log_ns: list[int]) -> list[int]:
+        """Stamps that belong to times of recording [ns]: the nearest message tells the difference."""
+        known = np.array(self._log_ns)
+        nearest = [int(np.abs(known - each).argmin()) for each in log_ns]
+        return [each + self._stamp_ns[i] - self._log_ns[i] for each, i in zip(log_ns, nearest, strict=True)]
+
+
+def recorded_acts(recording: Recording, namespace: str, clock: Clock) -> Acts:
+    """What the synchronizer of a namespace did; nothing where none was recorded. The joint states must be read."""
+    topic = f'{namespace}/{SYNCHRONIZER_STATE.name}'
+    if recording.types.get(topic) != SYNCHRONIZER_STATE.type:
+        return ()
+    if not clock.runs:
+        return ()
+    said = [(log_ns, str(message.data)) for _, log_ns, message in recording.decoded([topic])]
+    return tuple(zip(clock.stamps([log_ns for log_ns, _ in said]), (state for _, state in said), strict=True))
