@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dcdrw.trials.analysis import Analysis
-from dcdrw.trials.motion import MotionTable
+from dcdrw.trials.motion import MotionTable, thinned
 from dcdrw_control.sync.safety import State
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.rolling import rear_side
@@ -33,6 +33,10 @@ SCREEN = 9.0
 """Width on a screen [inch]; on a printed page its letters are of POINTS still."""
 CLOSE = 50
 """Steps from which on lines and marks are drawn finer, so that they do not run into one another."""
+MOST_DRAWN = 8192
+"""Rows of a motion that are drawn at most: several for each dot of the picture's width."""
+MOST_STANCES = 400
+"""Of more stances of a wheel each would be as wide as a dot: they are drawn as one."""
 LETTERS = 15
 """Letters of POINTS that an inch of a title's line holds."""
 _FORCE = '#555555'
@@ -117,9 +121,15 @@ class _Course(NamedTuple):
         motion = trial.motion
         if (np.diff(motion.stamp_ns) <= 0).any():
             motion = motion.rows(motion.restarts == motion.restarts[-1])
+        motion = thinned(motion, MOST_DRAWN)
         time = motion.seconds
         edges = pairwise([0, *motion.gaps.tolist(), len(time)])
         return cls(trial, motion, time, [(time[first], time[last - 1]) for first, last in edges if last > first])
+
+    @property
+    def bars(self) -> list[tuple[float, float]]:
+        """Begin and length of each piece [s]."""
+        return [(begin, end - begin) for begin, end in self.pieces]
 
     @property
     def step(self) -> float:
@@ -213,6 +223,9 @@ def _draw_gait(axes: Any, course: _Course) -> None:
     """Each bar is one stance, from a footfall to the next of that wheel; the legs alternate in shade."""
     for row, wheel in enumerate((REAR, FRONT)):
         falls = course.falls(wheel)
+        if len(falls) > MOST_STANCES:
+            axes.broken_barh(course.bars, (row - 0.3, 0.6), color=WHEELS[wheel], alpha=0.6, linewidth=0)
+            continue
         stances: tuple[list[tuple[float, float]], ...] = [], []
         for start, stop in course.pieces:
             inside = [(second, steps) for second, steps in falls if start <= second <= stop]
@@ -249,6 +262,7 @@ def _draw_feet(axes: Any, course: _Course) -> None:
                 rows[first + (steps + offset) % 2].append((begin, until - begin))
     for foot, bars in rows.items():
         wheel = FRONT if foot <= 2 else REAR
+        bars = course.bars if len(falls[wheel]) > MOST_STANCES else bars
         axes.broken_barh(bars, (-foot - 0.35, 0.7), color=WHEELS[wheel], alpha=0.85, linewidth=0)
     axes.set_yticks([-foot for foot in FEET], list(FEET.values()))
     axes.set_ylim(-4.6, -0.4)

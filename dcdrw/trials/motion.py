@@ -177,6 +177,14 @@ class Thinned:
             self._kept = _thin(self._kept, self._bin)
 
 
+def thinned(motion: MotionTable, most: int) -> MotionTable:
+    """At most so many rows of a motion: of each bin of neighbours those that `Thinned` keeps."""
+    size = FIRST_BIN
+    while len(motion.row) > most:
+        motion, size = _thin(motion, size), 2 * size
+    return motion
+
+
 def _thin(motion: MotionTable, size: int) -> MotionTable:
     """The rows to keep of bins of a size."""
     bins = motion.row // size

@@ -31,9 +31,9 @@ def draw_steps(trials: Sequence[tuple[int, RecordedTrial]]) -> Any:
     figure, axes = _axes()
     _shade_band(axes, max(trial.analysis.params.sync.band_percent for _, trial in trials))
     for number, trial in trials:
-        errors = _seen_errors(trial)
+        steps, errors = _seen_errors(trial)
         axes.plot(
-            np.arange(1, len(errors) + 1),
+            steps,
             50.0 + errors,
             linestyle=dashes(trial),
             marker='.',
@@ -59,14 +59,14 @@ def draw_times(trials: Sequence[tuple[int, RecordedTrial]]) -> Any:
 def draw_decay(trial: RecordedTrial) -> Any:
     """The error at each strike of the front wheel, and the geometric decay fitted to it."""
     figure, axes = _axes(2.6)
-    band, errors = trial.analysis.params.sync.band_percent, _seen_errors(trial)
-    steps = np.arange(1, len(errors) + 1)
+    band = trial.analysis.params.sync.band_percent
+    steps, errors = _seen_errors(trial)
     axes.axhspan(-band, band, color=BAND, alpha=0.18, linewidth=0, label=f'±{band:g} %')
     axes.axhline(0.0, color='0.85', linewidth=0.8, zorder=0)
     axes.plot(steps, errors, 'o', color=BLUE, markersize=4, label='error')
     limit, start, ratio, first = trial.decay
     if not math.isnan(limit):
-        fine = np.linspace(first, max(len(errors) - 1, 1), 400)
+        fine = np.linspace(first, max(steps[-1] - 1, 1), 400)
         axes.plot(
             fine + 1,
             limit + start * ratio ** (fine - first),
@@ -84,9 +84,11 @@ def _shade_band(axes: Any, band: float) -> None:
     axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), frameon=False, borderaxespad=0.1)
 
 
-def _seen_errors(trial: RecordedTrial) -> Floats:
-    """The error at each strike of the front wheel [%]; NaN at those that fell into a gap."""
-    return np.array([error if seen else math.nan for _, error, seen in trial.analysis.strike_errors()])
+def _seen_errors(trial: RecordedTrial) -> tuple[Floats, Floats]:
+    """Strikes of the front wheel, as many as a page shows, and the error there [%]; NaN where it fell into a gap."""
+    errors = np.array([error if seen else math.nan for _, error, seen in trial.analysis.strike_errors()])
+    every = len(errors) // MOST_POINTS + 1
+    return np.arange(1.0, len(errors) + 1)[::every], errors[::every]
 
 
 def _thinned(trial: RecordedTrial) -> tuple[Floats, Floats]:

@@ -8,7 +8,7 @@ import pytest
 
 from dcdrw.suite.parameter_file import TrialParams
 from dcdrw.trials.analysis import analyze
-from dcdrw.trials.figure import SCREEN, draw_trial, trial_figure
+from dcdrw.trials.figure import MOST_DRAWN, MOST_STANCES, SCREEN, draw_trial, trial_figure
 from dcdrw_sim.figures.style import COLUMN, for_print
 from dcdrw_sim.rig.person import PersonParams
 from dcdrw_sim.rig.simulator import SimulatorParams
@@ -48,6 +48,18 @@ def test_stances_and_footfalls_within_a_gap_are_left_out():
     marks = np.concatenate([line.get_xdata() for line in gait.lines])
     assert len(marks) > 30
     assert not ((marks > GAP[0]) & (marks < GAP[1])).any()
+
+
+def test_a_long_trial_is_drawn_with_no_more_than_its_dots_show():
+    long = trial_figure(analyze([batch(walk(300.0, 50.0).samples(), 1.0)], TrialParams()), '')
+    angles, _, gait = long.axes[:3]
+    assert all(np.isfinite(line.get_xdata()).sum() <= MOST_DRAWN for line in angles.lines)
+    assert sum(len(bars.get_paths()) for bars in gait.collections) <= 2 * MOST_STANCES
+    begin, end = (
+        f(path.vertices[:, 0].tolist())
+        for f, path in ((min, gait.collections[0].get_paths()[0]), (max, gait.collections[0].get_paths()[-1]))
+    )
+    assert (begin, end) == pytest.approx((0.0, 300.0), abs=0.1)
 
 
 def test_gaps_are_named_and_where_there_are_none_so_is_nothing():
