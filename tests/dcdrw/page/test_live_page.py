@@ -276,6 +276,7 @@ def test_page_outlives_nodes_servers_and_sleep(bench, live, chromium):
     assert 'hears nothing of dcdrw live' in text(tab, 'detail')
     assert tab.value("document.getElementById('reset').disabled")
     assert text(tab, 'hint') == '', 'nobody knows what runs'
+    assert tab.value("+getComputedStyle(document.getElementById('nodes')).opacity") < 0.5, 'nor what the nodes say now'
     live.start()
     for one in (tab, phone):
         one.wait(f'!{OLD}')
