@@ -98,9 +98,14 @@ class Cadence:
         Within bursts, which are stamped as they arrive, it is the mean one.
         """
         beat = self._beat
-        if beat is None or self.burst == 1 or elapsed * 1e9 > GAP * max(beat.period_ns, beat.apart_ns):
+        if beat is None or self.burst == 1 or self.is_gap(elapsed):
             return elapsed
         return beat.sample_ns * 1e-9
+
+    def is_gap(self, elapsed: float) -> bool:
+        """Whether so much time [s] between two samples is more than the source takes from one to the next."""
+        beat = self._beat
+        return beat is not None and elapsed * 1e9 > GAP * max(beat.period_ns, beat.apart_ns)
 
     def status(self) -> CadenceStatus:
         """A snapshot."""

@@ -326,8 +326,9 @@ class SyncMonitor:
         surprise = math.remainder(self._error - foretold, 100.0) if math.isfinite(foretold) else math.inf
         if self._is_held or abs(surprise) > SURPRISE:
             return self._error
-        self._watched = min(self._watched + dt, NOISE_MEMORY)
-        self._noise2 += (surprise * surprise - self._noise2) * min(dt / self._watched, 1.0)
+        if not self._cadence.is_gap(dt):  # over which rates foretell less
+            self._watched = min(self._watched + dt, NOISE_MEMORY)
+            self._noise2 += (surprise * surprise - self._noise2) * min(dt / self._watched, 1.0)
         return math.remainder(foretold + surprise * dt / (dt + SMOOTHING), 100.0)
 
     def _stalled(self, stamp_ns: int) -> tuple[str, ...]:

@@ -11,7 +11,9 @@ from dcdrw.trials.analysis import Analysis, analyze
 from dcdrw.trials.results import write_results
 from dcdrw.trials.summary import summarize
 from dcdrw_msgs_py.diagnosis import PairState
+from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.samples import SECOND, JointSample, Turn
+from dcdrw_sim.rig.simulator import SimulatedRig, SimulatorParams
 from tests.tracker.walking import walk
 from tests.trials import batch
 
@@ -40,6 +42,19 @@ def test_a_whole_trial_needs_no_remark():
     assert (summary.state, summary.reason, summary.complete) == (PairState.SYNCHRONIZED, None, True)
     assert (summary.remarks, summary.judged_from_s) == ((), 0.0)
     assert summary.sentence.count('. ') == 0
+
+
+@pytest.mark.parametrize('gaps', [[(18.172, 18.241), (18.31, 18.483)], [(4.659, 4.78), (6.39, 6.6), (18.31, 18.483)]])
+def test_samples_that_are_missing_leave_the_steps_as_they_are(gaps):
+    """Over a gap the phase is foretold badly; that is no noise, for which the band would be wider."""
+    rig = SimulatedRig(RigParams(), SimulatorParams(rate=float(RATE)))
+    samples = [rig.read(i / RATE, SECOND + i * SECOND // RATE) for i in range(26 * RATE)]
+    seen = [
+        sample for i, sample in enumerate(samples) if sample and not any(begin < i / RATE < end for begin, end in gaps)
+    ]
+    summary = summarize(trial(seen))
+    assert summary.samples.lost == len(samples) - len(seen) > 40
+    assert summary.steps_to_synchronization == 38
 
 
 def test_wheels_that_were_held_throughout_have_no_verdict(tmp_path):
