@@ -58,7 +58,11 @@ ARGUMENTS = {
         "plan the robot's legs a quarter stride ahead of the person's: of legs, or of the front wheel",
         SWITCH,
     ),
-    'enclaves': ('false', 'each node in the SROS2 enclave /dcdrw/NAME (see docs/security.md)', SWITCH),
+    'enclaves': (
+        'false',
+        "each node in the SROS2 enclave /dcdrw/NAME, the page in the operator's (see docs/security.md)",
+        SWITCH,
+    ),
     'on_exit': (
         'ignore',
         'when a node ends: ignore, the others go on; end, they end too; respawn, it starts again after a second',
@@ -81,6 +85,8 @@ def _actions(context):
     source, pace = chosen['source'], chosen['real_time_factor']
     if source == 'recording' and not chosen['recording']:
         raise ValueError('source:=recording needs recording:=FOLDER')
+    if on['enclaves'] and (on['one_process'] or on['rviz'] or source == 'recording'):
+        raise ValueError('enclaves:=true has none for one_process, rviz and source:=recording (see docs/security.md)')
     simulated = source == 'recording' or (source == 'sim' and (on['simulated_time'] or bool(pace)))
 
     person = source == 'sim' and on['person']
@@ -117,7 +123,11 @@ def _actions(context):
 
     def command(name, *arguments, namespace='--namespace'):
         space = [namespace, chosen['namespace']] if chosen['namespace'] else []
-        return ExecuteProcess(cmd=[ExecutableInPackage('dcdrw', 'dcdrw'), name, *arguments, *space], output='screen')
+        return ExecuteProcess(
+            cmd=[ExecutableInPackage('dcdrw', 'dcdrw'), name, *arguments, *space],
+            output='screen',
+            additional_env={'ROS_SECURITY_ENCLAVE_OVERRIDE': '/dcdrw/operator'} if on['enclaves'] else None,
+        )
 
     # First what may not be installed: a launch that fails must not leave nodes behind.
     actions = _rviz(chosen, simulated) if on['rviz'] else []

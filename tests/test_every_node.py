@@ -1,11 +1,14 @@
 """What holds for every node."""
 
+import ast
 import math
 import os
 import signal
 import time
+from pathlib import Path
 
 import pytest
+import rclpy.node
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rcl_interfaces.msg import Parameter, ParameterValue
@@ -18,12 +21,35 @@ from dcdrw.suite.executables import EXECUTABLES, PHASE_ESTIMATOR, SIMULATOR, SYN
 from dcdrw_msgs_py.messages import to_stamp
 from dcdrw_msgs_py.quantity import fields
 from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, PHASE_STATE, Topic
+from tests import ROOT
 from tests.bench import Bench
 
 pytestmark = pytest.mark.processes
 
 OF_ROS = {'/rosout', '/parameter_events', '/clock'}
 NAMES = [node.name for node in EXECUTABLES]
+
+
+def attributes(tree: ast.AST) -> set[str]:
+    """What objects of a class keep under `self`."""
+    return {
+        part.attr
+        for part in ast.walk(tree)
+        if isinstance(part, ast.Attribute)
+        and isinstance(part.ctx, ast.Store)
+        and isinstance(part.value, ast.Name)
+        and part.value.id == 'self'
+    }
+
+
+def test_no_node_keeps_something_of_its_own_where_rclpy_keeps_the_nodes():
+    """A recorder that kept `_parameters` had none of its own any more."""
+    theirs = attributes(ast.parse(Path(rclpy.node.__file__).read_text()))
+    assert {'_parameters', '_clock'} <= theirs
+    for file in sorted(ROOT.glob('dcdrw*/**/*_node.py')):
+        for part in ast.walk(ast.parse(file.read_text())):
+            if isinstance(part, ast.ClassDef) and any(getattr(base, 'id', '') == 'Node' for base in part.bases):
+                assert not attributes(part) & theirs, file
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])

@@ -61,6 +61,19 @@ def started():
             'nodes': [node.node_executable for node in nodes],
             'respawned': [node.node_executable for node in nodes if node._ExecuteLocal__respawn],
             'ending_all': len(handlers),
+            'enclaves': {
+                node.node_executable: node._Node__ros_arguments[1] for node in nodes if node._Node__ros_arguments
+            },
+            'environments': [
+                {
+                    launch.utilities.perform_substitutions(context, name): launch.utilities.perform_substitutions(
+                        context, value
+                    )
+                    for name, value in action.additional_env or ()
+                }
+                for action in actions
+                if action not in [*nodes, *handlers]
+            ],
             'commands': [
                 [launch.utilities.perform_substitutions(context, part) for part in action.cmd[1:]]
                 for action in actions
@@ -119,6 +132,16 @@ def test_a_person_in_front_comes_with_the_synchronizer(started):
     }
     assert set(started(person='true', one_process='true')['nodes']) == {'suite', 'simulator'}
     assert set(started(synchronizer='true')['nodes']) == {*CORE, 'simulator', 'synchronizer'}
+
+
+def test_nodes_have_enclaves_of_their_own_and_the_page_the_operators(started):
+    guarded = started(enclaves='true', record='true', live='true')
+    assert guarded['enclaves'] == {name: f'/dcdrw/{name}' for name in (*CORE, 'simulator', 'recorder')}
+    assert guarded['environments'] == [{'ROS_SECURITY_ENCLAVE_OVERRIDE': '/dcdrw/operator'}]
+    assert (started()['enclaves'], started(live='true')['environments']) == ({}, [{}])
+    for other in ({'one_process': 'true'}, {'rviz': 'true'}, {'source': 'recording', 'recording': 'day/7'}):
+        with pytest.raises(ValueError, match='enclaves:=true has none for'):
+            started(enclaves='true', **other)
 
 
 def test_a_rig_is_seen_by_the_tag_tracker(started):

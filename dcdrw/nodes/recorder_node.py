@@ -44,7 +44,8 @@ class RecorderNode(Node):
         self.failure = ''
         """Why the last recording ended before it was told to."""
         self._ears: dict[str, _Ear] = {}
-        self._parameters: dict[str, dict[str, Any]] = {}
+        self._told: dict[str, dict[str, Any]] = {}
+        """The parameters that the nodes told."""
         self._asked: dict[str, float] = {}
         self._questions = {
             node.name: (
@@ -76,7 +77,7 @@ class RecorderNode(Node):
         params = self._settings.value
         self.recorder = Recorder(Path(params.folder) if params.folder else new_folder(), {'note': params.note})
         self.failure = ''
-        self._parameters.clear()
+        self._told.clear()
         self._asked.clear()
         self._look()
         self.get_logger().info(f'recording to {self.recorder.folder}')
@@ -132,7 +133,7 @@ class RecorderNode(Node):
                 self._listen(name, topic._replace(type=kind))
         for node, (client, names) in self._questions.items():
             late = time.monotonic() - self._asked.get(node, 0.0) > ASK_AGAIN_SECONDS
-            if node not in self._parameters and late and client.service_is_ready():
+            if node not in self._told and late and client.service_is_ready():
                 self._asked[node] = time.monotonic()
                 client.call_async(GetParameters.Request(names=names)).add_done_callback(
                     partial(self._on_parameters, node, names)
@@ -181,7 +182,7 @@ class RecorderNode(Node):
         if self.recorder is None or response is None or len(response.values) != len(names):
             return
         values = zip(names, map(parameter_value_to_python, response.values), strict=True)
-        self._parameters[node] = {
+        self._told[node] = {
             'ros__parameters': {
                 name: list(value) if isinstance(value, (array, tuple)) else value
                 for name, value in values
@@ -189,7 +190,7 @@ class RecorderNode(Node):
             }
         }  # NaN: derived from others
         space = self.get_namespace().rstrip('/')  # nodes take parameters only under their whole name
-        text = yaml_text({f'{space}/{name}' if space else name: values for name, values in self._parameters.items()})
+        text = yaml_text({f'{space}/{name}' if space else name: values for name, values in self._told.items()})
         self.recorder.about['parameters'] = text
         try:
             write_whole(self.recorder.folder / PARAMETERS, text)
@@ -226,7 +227,7 @@ class RecorderNode(Node):
                 STATE: RecorderState.RECORDING,
                 'folder': str(recorder.folder),
                 'size [MB]': recorder.size / 1e6,
-                **{parameters_of(node): True for node in self._parameters},
+                **{parameters_of(node): True for node in self._told},
                 **{messages_of(topic): count for topic, count in recorder.counts.items()},
             },
         )

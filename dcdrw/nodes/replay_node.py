@@ -59,7 +59,7 @@ class ReplayNode(Node):
         super().__init__('replay', **kwargs)
         self._recording, self._joint_messages, self._part, self._names = recording, joints, part, names
         self._joints = advertise(self, JOINT_STATES)
-        self._clock = advertise(self, CLOCK)
+        self._clock_publisher = advertise(self, CLOCK)
         self._runs = advertise(self, RUNS)
         self._announced: list[Message] = []
         self.sent = 0
@@ -92,7 +92,7 @@ class ReplayNode(Node):
         now = time.monotonic()
         found = (
             self._joints.get_subscription_count(),
-            self._clock.get_subscription_count(),
+            self._clock_publisher.get_subscription_count(),
             len(self.get_node_names()),
             len(self.get_topic_names_and_types()),
         )
@@ -130,7 +130,7 @@ class ReplayNode(Node):
         self.log_ns = message.log_ns
         if not 0 <= stamp_ns - self._told_ns < CLOCK_NS:  # the clock first: no sample lies far in the future
             self._told_ns = stamp_ns
-            self._clock.publish(Clock(clock=to_stamp(stamp_ns)))
+            self._clock_publisher.publish(Clock(clock=to_stamp(stamp_ns)))
         while self._announced and _stamp_ns(self._announced[0]) <= stamp_ns:  # the run before its first sample
             self._runs.publish(self._announced.pop(0).data)
         if self._names:
