@@ -141,7 +141,7 @@ def stopping(seconds: float, seed: int = 0) -> Score:
         if walks and stride >= until:
             walks, until = False, i * tick + chance.uniform(2.0, 4.0)
         elif not walks and speed == 0.0 and i * tick >= until:
-            walks, until, pace = True, stride + chance.uniform(5.0, 10.0), chance.uniform(0.7, 1.1)
+            walks, until, pace = True, stride + chance.uniform(5.0, 10.0), chance.uniform(0.7, 1.0)
         rate = pace * tick / 0.4  # within 0.4 s to the pace, and to a stand
         speed = min(speed + rate, pace) if walks else max(speed - rate, 0.0)
         stride += speed * tick

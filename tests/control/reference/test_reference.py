@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from reference import LATE_GOAL, ORDER_GOAL, on_the_treadmill, simulated_person, walking_20_m
+from reference import LATE_GOAL, ORDER_GOAL, on_the_treadmill, simulated_person, stopping, walking_20_m
 
 from dcdrw_control.reference.diagnosis import diagnose_reference
 from dcdrw_control.reference.joint_table import DEFAULT, read_joint_table
@@ -193,6 +193,13 @@ def test_the_robots_feet_fall_a_quarter_stride_ahead_of_people(person):
     assert score.falls > 20
     assert score.rms <= LATE_GOAL
     assert score.right >= ORDER_GOAL
+
+
+@pytest.mark.parametrize('seed', [0, 1])
+def test_a_person_who_stops_anywhere_and_starts_again_is_no_warning(seed):
+    score = stopping(40.0, seed)
+    assert score.falls > 50
+    assert (score.right, score.alarms) == (1.0, 0)
 
 
 def test_the_goals_are_those_promised():

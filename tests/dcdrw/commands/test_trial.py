@@ -14,7 +14,11 @@ from pathlib import Path
 import pytest
 
 from dcdrw.cli import main
+from dcdrw.recordings.recording import Recording
+from dcdrw.trials.figure import trial_figure
+from dcdrw.trials.results import read_trial
 from dcdrw_msgs_py.diagnosis import STATE, STEPS_TO_SYNCHRONIZATION, PairState
+from dcdrw_msgs_py.topics import COUPLER_WRENCH, ENABLE, PERSON_FORCE, REAR_TORQUE_COMMAND, SYNCHRONIZER_STATE
 from tests import ROOT
 from tests.children import nodes, runs
 
@@ -98,6 +102,14 @@ def test_a_person_s_trial_is_run_closed_loop_and_tells_the_force_on_the_person(t
     assert 0.0 < force['rms'] < force['peak'] < 20.0
     assert f'On the person: {force["peak"]:.1f} N at most' in output
     assert 'active' in (tmp_path / 'out' / 'synchronizer.log').read_text()
+    with Recording(tmp_path / 'out') as recording:
+        recorded = [SYNCHRONIZER_STATE, REAR_TORQUE_COMMAND, COUPLER_WRENCH, PERSON_FORCE, ENABLE]
+        assert all(recording.count(f'/{topic.name}') for topic in recorded)
+    trial, _ = read_trial(tmp_path / 'out')
+    (begins, _), *_ = [act for act in trial.acts if act[1] == 'active']
+    assert -1.0 < (begins - trial.start_ns) / 1e9 < 5.0  # it is enabled when the wheels have been let go
+    panels = [axes.get_ylabel() for axes in trial_figure(trial, '').axes]
+    assert 'synchronizer' in panels
 
 
 def test_no_sentence_is_protocol(tmp_path):
