@@ -34,9 +34,9 @@ class _Streams(NamedTuple):
 class _Seldom(NamedTuple):
     """What happens seldom: several times as many, and each costs time in every wait."""
 
-    clients: tuple[Any, ...]
-    services: tuple[Any, ...]
-    waitables: tuple[Any, ...]
+    clients: tuple[Any, ...] = ()
+    services: tuple[Any, ...] = ()
+    waitables: tuple[Any, ...] = ()
     """What happens rarely."""
 
 
@@ -51,7 +51,9 @@ class StreamExecutor(Executor):
 
     _tasks: list[Any]
     _streams = _Streams()
-    _seldom: _Seldom | None = None
+    _seldom = _Seldom()
+    _has_changed = True
+    _known: set[Any] | None = None
     _seldom_due = 0.0
     _rarely_due = 0.0
     _wait_set: Any = None
@@ -68,18 +70,16 @@ class StreamExecutor(Executor):
         """
         self._run_tasks()
         end = math.inf if timeout_sec is None or timeout_sec < 0.0 else time.monotonic() + timeout_sec
-        streams = _Streams(*self._all_of(_Streams))
+        if self._has_changed or self._known != self._nodes:
+            self._look_up()
+        streams = self._streams
         ready, seldom = set[int](), None
-        if streams == self._streams and time.monotonic() < self._seldom_due:
+        if time.monotonic() < self._seldom_due:
             ready = self._wait(streams, None, min(end, self._seldom_due))
         if not ready:
-            seldom = _Seldom(*self._all_of(_Seldom))
-            if (streams, seldom) != (self._streams, self._seldom):
-                self._streams, self._seldom, self._rarely_due = streams, seldom, 0.0
-                self._wait_set = self._make_wait_set(streams, seldom)
             asked = False
             if time.monotonic() < self._rarely_due:
-                seldom = seldom._replace(waitables=())
+                seldom = self._seldom._replace(waitables=())
                 ready = self._wait(streams, seldom, min(end, self._rarely_due))
                 asked = any(map(self._wait_set.get_ready_entities, _ASKING_KINDS))
             if not (ready or asked):
@@ -104,6 +104,18 @@ class StreamExecutor(Executor):
         """As `spin_once`; a future that is done ends the wait."""
         future.add_done_callback(lambda _: self.wake())
         self.spin_once(getattr(timeout_sec, 'timeout', timeout_sec))
+
+    def wake(self) -> None:
+        """End a wait, because entities of a node have come or gone, or a future is done."""
+        self._has_changed = True
+        super().wake()
+
+    def _look_up(self) -> None:
+        """Find what there is to wait for."""
+        self._has_changed, self._known = False, set(self._nodes)
+        self._streams, self._seldom = _Streams(*self._all_of(_Streams)), _Seldom(*self._all_of(_Seldom))
+        self._wait_set = self._make_wait_set(self._streams, self._seldom)
+        self._seldom_due = self._rarely_due = 0.0
 
     def _all_of(self, kinds: type[_Streams | _Seldom]) -> list[tuple[Any, ...]]:
         """The entities of these kinds, of all nodes."""
