@@ -137,15 +137,18 @@ def verdict(trial: Analysis) -> str:
     start, end = 100.0 * status.initial_phase, 100.0 * status.phase
     low, high = status.final_band_percent
     course = f'from {start:.1f} % to {end:.1f} % in {status.steps} steps'
-    outside = f'outside ±{band:g} % of 50 %'
+    where = f'outside ±{band:g} % of 50 %'
+    if abs(status.error_percent) <= band:
+        hold = trial.params.sync.hold_steps
+        where = f'within ±{band:g} % of 50 %, but not for {hold} whole steps'
     return {
         PairState.STALLED: f'From {start:.1f} %: the {" and the ".join(status.stalled)} wheel stalled after '
         f'{status.steps} steps.',
         PairState.SLIPPED: f'A step slipped shortly before the end: {course}, n = {status.step_difference}.',
-        PairState.LOST: f'Synchronization was lost: {course}, {outside}.',
+        PairState.LOST: f'Synchronization was lost: {course}, {where}.',
         PairState.SYNCHRONIZED: f'From {start:.1f} % to within ±{band:g} % of 50 % of a step (25 % of a stride) in '
         f'{status.steps_to_synchronization} steps; in the last ones {50 + low:.1f} to {50 + high:.1f} %.',
-        PairState.CONVERGING: f'Not synchronized: {course}, {outside}.',
+        PairState.CONVERGING: f'Not synchronized: {course}, {where}.',
     }[trial.state]
 
 

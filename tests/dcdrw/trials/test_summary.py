@@ -57,6 +57,15 @@ def test_samples_that_are_missing_leave_the_steps_as_they_are(gaps):
     assert summary.steps_to_synchronization == 38
 
 
+def test_a_trial_that_ends_within_the_band_too_early_is_not_said_to_be_outside():
+    entered = summarize(trial(WALK)).steps_to_synchronization
+    strikes = [fall.stamp_ns for fall in trial(WALK).footfalls if fall.wheel == 'front']
+    summary = summarize(trial([sample for sample in WALK if sample.stamp_ns < strikes[entered] + SECOND // 10]))
+    assert abs(summary.final_phase_percent - 50.0) < 6.0
+    assert summary.sentence.startswith('Not synchronized')
+    assert 'within ±6 % of 50 %, but not for 3 whole steps' in summary.sentence
+
+
 def test_wheels_that_were_held_throughout_have_no_verdict(tmp_path):
     summary = summarize(trial(held(5.0)))
     assert (summary.state, summary.synchronized, summary.steps_to_synchronization) == (PairState.HELD, None, None)
