@@ -27,7 +27,8 @@ th, td { padding: .3rem .45rem; border-bottom: 1px solid var(--line); text-align
 th { font-weight: 600; line-height: 1.25; vertical-align: bottom; } th small { font-weight: 400; }
 td { white-space: nowrap; }
 th.text, td.text { text-align: left; white-space: normal; }
-td.name { min-width: 8em; max-width: 18em; overflow-wrap: break-word; } td.name + td { min-width: 9.6em; }
+td.name { min-width: 8em; max-width: 18em; overflow-wrap: break-word; }
+td :is(.ok, .bad, .none) { white-space: nowrap; }
 .wide { overflow-x: auto; }
 .ok { color: var(--ok); font-weight: 600; } .bad { color: var(--bad); font-weight: 600; } .none { opacity: .75; }
 .verdict { font-size: 1.15rem; } .remarks { margin-top: .3rem; }
@@ -46,7 +47,7 @@ dt { font-weight: 600; } dd { margin: 0; overflow-wrap: anywhere; }
   table { font-size: 7pt; } th, td { padding: .15rem .2rem; }
   figure { margin: .4rem 0; padding: 0; } figure svg { width: 96%; margin: auto; }
   figcaption { font-size: 8pt; padding: 0; } dl { font-size: 8pt; padding: .2rem .6rem; break-inside: avoid; }
-  h2 { margin-top: 0; } td.name + td { min-width: 0; }
+  h2 { margin-top: 0; }
   .verdict { font-size: 11pt; }
   h2 { break-before: page; } .wide { overflow: visible; } .downloads, fieldset button { display: none; }
   a { color: inherit; text-decoration: none; }
@@ -183,7 +184,7 @@ _VERDICTS = {
 def _verdict(trial: RecordedTrial) -> str:
     words, kind = _VERDICTS[trial.summary.state]
     less = '' if trial.summary.complete or not trial.analysis.ran else ', of a part'
-    return f'<span class="{kind}">{words}{less}</span>'
+    return f'<span class="{kind}">{words}</span>{less}'
 
 
 def _sentence(trial: RecordedTrial) -> str:
