@@ -190,4 +190,5 @@ def _draw_sensitivity(axes: Any, chosen: dict[str, Assessment]) -> None:
     ]
     axes.set_xticks(range(len(labels)), labels)
     axes.set(ylabel='steps, worst start', ylim=(0, 1.1 * highest))
+    axes.locator_params(axis='y', integer=True)
     axes.set_title('what if one is off', loc='left')
