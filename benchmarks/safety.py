@@ -137,6 +137,7 @@ class Stack:
     def kill(self, name: str) -> None:
         """SIGKILL, without a warning."""
         self._running[name].kill()
+        self._running[name].join()
 
     def revive(self) -> list[str]:
         """Start again what was killed, and tell what that is."""

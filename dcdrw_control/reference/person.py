@@ -15,6 +15,8 @@ STANDING_SECONDS = 0.5
 """A person who has hardly moved for so long stands [s]: the longest pause within a stride takes half of that."""
 HARDLY = 0.02
 """[strides]"""
+IN_TURN = 0.25
+"""Legs that are nearer to half a stride apart go on in turn [strides]."""
 LEAP = 0.5
 """More than that within one sample is no step, but another source [strides]."""
 
@@ -26,6 +28,12 @@ class GaitSample(NamedTuple):
     person: tuple[float, float]
     robot: tuple[float, float] | None = None
     """None where the robot's legs have no sensors, or are unknown."""
+
+    @property
+    def strides(self) -> bool:
+        """Whether the person's legs go on in turn; else the person turns, or steps on the spot: there is no order."""
+        left, right = self.person
+        return abs((left - right) % 1.0 - 0.5) < IN_TURN
 
 
 class WheelGait:

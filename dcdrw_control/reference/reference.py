@@ -195,7 +195,7 @@ class LegReference:
         return State.WALKING if whole else State.STARTING
 
     def _see(self, sample: GaitSample) -> None:
-        """Judge the footfalls that have happened since the last sample, while the robot walks."""
+        """Judge the footfalls since the last sample, while the robot walks and the person strides."""
         seen = [
             fall
             for foot, phase in zip((*FRONT_FEET, *REAR_FEET), (*sample.person, *(sample.robot or ())), strict=False)
@@ -204,7 +204,7 @@ class LegReference:
         if sample.robot is None:
             seen += [fall for fall in self._waiting if fall.stamp_ns <= sample.stamp_ns]
         self._waiting = [fall for fall in self._waiting if fall.stamp_ns > sample.stamp_ns]
-        if self._state is not State.WALKING:
+        if self._state is not State.WALKING or not sample.strides:
             self.order.begin()
             return
         for fall in sorted(seen, key=lambda one: one.stamp_ns):
