@@ -19,6 +19,8 @@ source_suffix = {'.rst': 'restructuredtext', '.md': 'markdown', '.py': 'markdown
 html_theme = 'sphinx_rtd_theme'
 html_theme_options = {'navigation_depth': 3}
 html_show_sourcelink = False
+html_static_path = ['_static']
+html_css_files = ['site.css']
 
 myst_heading_anchors = 4
 default_role = 'code'
