@@ -150,10 +150,11 @@ def lookup(params: tuple[Any, ...], name: str) -> Any:
 
 
 def suggestion(name: object, known: Iterable[str]) -> str:
-    """The end of a message on a name that is unknown: the nearest that is known, or all."""
-    names = list(known)
-    near = get_close_matches(str(name), names, n=1)
-    return f'; did you mean {near[0]}?' if near else f'; known are {", ".join(names)}'
+    """The end of a message on a name that is unknown: the nearest that are known, or all."""
+    names, word = list(known), str(name).lower()
+    near = [one for one in names if one.lower() == word or one.rpartition('.')[2] == word]  # mass: of either wheel
+    near = near or get_close_matches(str(name), names, n=1)
+    return f'; did you mean {" and ".join(near)}?' if near else f'; known are {", ".join(names)}'
 
 
 def build(params: type[Params], values: Mapping[str, Any], source: str = '') -> Params:

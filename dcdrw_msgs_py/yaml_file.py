@@ -116,7 +116,8 @@ def read_yaml(path: Path) -> Any:
     try:
         return parse_yaml(text)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ValueError(f'{path} is not YAML: {" ".join(str(error).split())}') from None
+        tab = ' (a tab indents a line: use blanks)' if re.search(r'^ *\t', text, re.MULTILINE) else ''
+        raise ValueError(f'{path} is not YAML: {" ".join(str(error).split())}{tab}') from None
 
 
 def parse_yaml(text: str) -> Any:

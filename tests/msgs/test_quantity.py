@@ -130,6 +130,8 @@ def test_a_list_may_be_empty(nothing):
         ({'rest': math.inf}, 'rest must be finite s, got inf'),
         ({'ratio': -1.1}, 'ratio must be ≥ -1, ≤ 1, got -1.1'),
         ({'rigth.size': 1.0}, r'rigth\.size is not a parameter \(rig\.yaml\); did you mean right\.size\?'),
+        ({'size': 1.0}, r'size is not a parameter \(rig\.yaml\); did you mean left\.size and right\.size\?'),
+        ({'Flag': True}, r'Flag is not a parameter \(rig\.yaml\); did you mean flag\?'),
         ({'zzz': 1.0}, r'zzz is not a parameter \(rig\.yaml\); known are left\.size, left\.count'),
     ],
 )

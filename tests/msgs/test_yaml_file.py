@@ -64,6 +64,7 @@ def test_what_pyyaml_would_write_plainly_is_quoted_where_a_node_would_take_it_fo
     ('data', 'message'),
     [
         (b'a: [', 'is not YAML: while parsing'),
+        (b'a:\n  b:\n\tc: 1', r'is not YAML: .*\(a tab indents a line: use blanks\)'),
         (b'\xff\xfe\xff', 'is not UTF-8 text'),
         (b'a: !!python/object/apply:os.system [ls]', 'is not YAML: could not determine a constructor'),
         (b'a: &x [1]\nb: *x', r'is not YAML: line 2 has the alias \*x: write its value there'),
