@@ -1,5 +1,9 @@
 """ROS's own linters, as `colcon test` runs them where they are installed; elsewhere ruff checks the same."""
 
+import os
+import re
+from urllib.request import urlopen
+
 import pytest
 
 from tests import ROOT
@@ -29,5 +33,12 @@ def test_pep257():
 
 
 def test_xmllint():
+    """The schema that package.xml names is fetched, unless a catalog of XML (XML_CATALOG_FILES) has it."""
     linter = pytest.importorskip('ament_xmllint.main')
+    schema = re.findall('http://[^"]*[.]xsd', (ROOT / 'package.xml').read_text())[0]
+    try:
+        urlopen(schema, timeout=10.0).close()
+    except OSError:
+        if 'XML_CATALOG_FILES' not in os.environ:
+            pytest.skip(f'no network: {schema} cannot be fetched')
     assert linter.main([str(ROOT / 'package.xml'), str(ROOT / 'config')]) == 0

@@ -12,6 +12,10 @@ from dcdrw_msgs_py.frame import Frame
 from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.samples import SECOND
 
+SLOWEST_RATE, FASTEST_RATE = 1e-3, 1e5
+"""No file tells a rate beyond these in earnest [Hz]."""
+LONGEST = 1e8
+"""No frame is taken so long after the first [s]."""
 RAW_RATE = 25.0
 """What FFmpeg makes of a stream without index and stamps (raw MJPEG, H.264) [Hz]."""
 ENDS_EARLY = 0.98
@@ -39,15 +43,22 @@ class VideoFile:
         self._capture = cv2.VideoCapture(str(path))
         if not self._capture.isOpened():
             raise ValueError(f'{path} is not a video that OpenCV reads, or it is truncated')
-        width, height = (int(self._capture.get(key)) for key in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
+        width, height = self._told(cv2.CAP_PROP_FRAME_WIDTH), self._told(cv2.CAP_PROP_FRAME_HEIGHT)
         if width * height > LARGEST_PICTURE:
-            raise ValueError(f'{path} claims pictures of {width} × {height} pixels, more than a camera takes')
-        self.own_rate = float(self._capture.get(cv2.CAP_PROP_FPS))
+            raise ValueError(f'{path} claims pictures of {width:.0f} × {height:.0f} pixels, more than a camera takes')
+        self.own_rate = self._told(cv2.CAP_PROP_FPS)
         """Frames per second that the file tells; 0 where it does not."""
-        self.count = max(int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT)), 0)
+        if not SLOWEST_RATE <= self.own_rate <= FASTEST_RATE:
+            self.own_rate = 0.0
+        self.count = int(self._told(cv2.CAP_PROP_FRAME_COUNT))
         """Frames that the file promises; 0 where it does not say."""
         self.read = 0
         """Frames that have been read."""
+
+    def _told(self, key: int) -> float:
+        """What the file tells of itself; 0 where it is no number that can be."""
+        value = float(self._capture.get(key))
+        return value if 0.0 < value < math.inf else 0.0
 
     @property
     def complaint(self) -> str:
@@ -64,9 +75,10 @@ class VideoFile:
 
         """
         cv2, first, last = opencv(), 0.0, -1.0
+        no_stamps = f'{self._path} has no time stamps: set frame_rate to that of the camera'
         invented = self.count == 0 and self.own_rate in (0.0, RAW_RATE)
         if invented and math.isnan(self._given_rate):
-            raise ValueError(f'{self._path} has no time stamps: set frame_rate to that of the camera')
+            raise ValueError(no_stamps)
         while True:
             try:
                 good, image = self._capture.read()
@@ -76,13 +88,13 @@ class VideoFile:
                 self._capture.release()
                 return
             time = self._capture.get(cv2.CAP_PROP_POS_MSEC) * 1e-3
-            if self.read == 0:
-                first = time
-            time -= first
+            first, time = (time, 0.0) if self.read == 0 else (first, time - first)
             if math.isfinite(self._given_rate):
                 time = self.read / self._given_rate
-            elif not last < time < math.inf:  # they stand still
-                time = last + 1.0 / (self.own_rate or RAW_RATE)
+            elif not last < time < LONGEST:  # they stand still
+                if not self.own_rate:
+                    raise ValueError(no_stamps)
+                time = last + 1.0 / self.own_rate
             self.read += 1
             last = time
             yield Frame(start_ns + round(time * SECOND), np.asarray(image, np.uint8))

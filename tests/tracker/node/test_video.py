@@ -2,6 +2,7 @@
 
 import math
 import time
+from contextlib import suppress
 from itertools import pairwise
 
 import numpy as np
@@ -51,6 +52,20 @@ def test_a_given_frame_rate_takes_the_place_of_the_files(tmp_path):
     """A high-speed camera's file often says 25 or 30 Hz."""
     stamps = [frame.stamp_ns for frame in VideoFile(write(tmp_path / 'a.avi', 5), 240.0).frames()]
     assert stamps == [round(i / 240 * 1e9) for i in range(5)]
+
+
+@pytest.mark.parametrize('rate', [b'\0' * 8, b'\0\0\0\0\1\0\0\0', b'\1\0\0\0\0\0\0\0', b'\xff\xff\xff\x7f\1\0\0\0'])
+def test_a_file_whose_rate_is_no_number_asks_for_one(rate, tmp_path):
+    path = write(tmp_path / 'a.avi', 5)
+    data = bytearray(path.read_bytes())
+    at = data.index(b'strh') + 28  # scale and rate
+    data[at : at + 8] = rate
+    path.write_bytes(data)
+    assert [frame.stamp_ns for frame in VideoFile(path, 50.0).frames()] == [20_000_000 * i for i in range(5)]
+    stamps = []
+    with suppress(ValueError):
+        stamps += [frame.stamp_ns for frame in VideoFile(path).frames()]
+    assert all(0 < later - earlier < 10**12 for earlier, later in pairwise(stamps))
 
 
 def test_a_truncated_video_is_told_and_what_is_there_is_read(tmp_path):
