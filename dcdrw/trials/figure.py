@@ -42,6 +42,7 @@ LETTERS = 15
 _FORCE = '#555555'
 ACTS = 0.8
 """Height of the panel of the synchronizer's states, as those of the others in `trial_figure`."""
+ACTS_LABEL = 'synchro-\nnizer'
 STATES = {
     State.DISABLED: '0.8',
     State.ARMED: SKY,
@@ -309,5 +310,5 @@ def _draw_acts(axes: Any, course: _Course) -> None:
         axes.broken_barh(bars, (0.0, 1.0), color=colour, linewidth=0, label=state.value if bars else None)
     axes.set_yticks([])
     axes.set_ylim(0.0, 1.0)
-    axes.set_ylabel('synchronizer', rotation=0, ha='right', va='center')
+    axes.set_ylabel(ACTS_LABEL, rotation=0, ha='right', va='center')
     _legend(axes)

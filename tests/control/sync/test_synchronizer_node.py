@@ -117,12 +117,15 @@ def test_whoever_is_killed_leaves_no_force_on(bench, victim):
 
 
 def test_a_heartbeat_that_ends_and_a_value_that_is_no_number_end_the_force(bench):
-    loop = Loop(bench)
+    loop, intruder = Loop(bench), bench.publisher(PHASE_STATE)
     loop.let_go(lambda: None, 'the end without a heartbeat')
     loop.push()
-    intruder = bench.publisher(PHASE_STATE)
-    intruder.publish(JointState(name=['front_stance'], position=[math.nan]))
-    loop.until(lambda: loop.force == 0.0 and loop.state == 'fault', 'the fault')
+
+    def ends():
+        intruder.publish(JointState(name=['front_stance'], position=[math.nan]))
+        return loop.force == 0.0 and loop.state == 'fault'
+
+    loop.until(ends, 'the fault')
 
 
 def test_a_second_publisher_of_the_command_is_a_fault(bench):

@@ -15,7 +15,7 @@ import pytest
 
 from dcdrw.cli import main
 from dcdrw.recordings.recording import Recording
-from dcdrw.trials.figure import trial_figure
+from dcdrw.trials.figure import ACTS_LABEL, trial_figure
 from dcdrw.trials.results import read_trial
 from dcdrw_msgs_py.diagnosis import STATE, STEPS_TO_SYNCHRONIZATION, PairState
 from dcdrw_msgs_py.topics import COUPLER_WRENCH, ENABLE, PERSON_FORCE, REAR_TORQUE_COMMAND, SYNCHRONIZER_STATE
@@ -109,7 +109,7 @@ def test_a_person_s_trial_is_run_closed_loop_and_tells_the_force_on_the_person(t
     (begins, _), *_ = [act for act in trial.acts if act[1] == 'active']
     assert -1.0 < (begins - trial.start_ns) / 1e9 < 5.0  # it is enabled when the wheels have been let go
     panels = [axes.get_ylabel() for axes in trial_figure(trial, '').axes]
-    assert 'synchronizer' in panels
+    assert ACTS_LABEL in panels
 
 
 def test_no_sentence_is_protocol(tmp_path):

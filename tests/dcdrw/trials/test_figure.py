@@ -8,7 +8,7 @@ import pytest
 
 from dcdrw.suite.parameter_file import TrialParams
 from dcdrw.trials.analysis import analyze
-from dcdrw.trials.figure import MOST_DRAWN, MOST_STANCES, SCREEN, draw_trial, trial_figure
+from dcdrw.trials.figure import ACTS_LABEL, MOST_DRAWN, MOST_STANCES, SCREEN, draw_trial, trial_figure
 from dcdrw_sim.figures.style import COLUMN, for_print
 from dcdrw_sim.rig.person import PersonParams
 from dcdrw_sim.rig.simulator import SimulatorParams
@@ -92,11 +92,11 @@ def test_the_synchronizers_states_are_drawn_from_when_they_were_told_to_the_next
     start_ns = WALK[0].stamp_ns
     acts = ((start_ns - 10**9, 'disabled'), (start_ns + 2 * 10**9, 'active'), (start_ns + 5 * 10**9, 'fault'))
     drawn = trial_figure(analyze([batch(WALK)], TrialParams())._replace(acts=acts), '').axes
-    panel = next(axes for axes in drawn if axes.get_ylabel() == 'synchronizer')
+    panel = next(axes for axes in drawn if axes.get_ylabel() == ACTS_LABEL)
     assert [text.get_text() for text in panel.get_legend().get_texts()] == ['disabled', 'active', 'fault']
     begins = sorted(path.vertices[:, 0].min() for bars in panel.collections for path in bars.get_paths())
     assert begins[:3] == pytest.approx([0.0, 2.0, 5.0], abs=0.1)
-    assert 'synchronizer' not in [axes.get_ylabel() for axes in figure(WALK).axes]
+    assert ACTS_LABEL not in [axes.get_ylabel() for axes in figure(WALK).axes]
 
 
 def test_a_source_without_force_has_no_empty_panel():
