@@ -10,6 +10,9 @@ from dcdrw_msgs_py.samples import SECOND
 from dcdrw_tracker.gait.diagnostics import HINTS, REFUSALS
 from dcdrw_tracker.gait.phase import Restart
 
+MANY_DISBELIEVED = 0.1
+"""The share of the samples from which on it is said that their speeds are not used; fewer lie around gaps."""
+
 
 class Remark(NamedTuple):
     """What a reader of the verdict should know."""
@@ -53,6 +56,8 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         )
     if estimator.duplicates:
         yield Remark(f'{_number_of(estimator.duplicates, "joint state")} came again as they were, and count once.')
+    if estimator.disbelieved > MANY_DISBELIEVED * estimator.accepted:
+        yield Remark('The speeds in the joint states do not go with the rotations: those of the rotations are used.')
     for step in estimator.clock_steps:
         yield Remark(
             f'The clock of the source was set by {step.seconds:+.3g} s while the wheels rolled on; '

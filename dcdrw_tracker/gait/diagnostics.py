@@ -87,6 +87,7 @@ def diagnose_phase(status: PhaseStatus, age: float, stale_after: float) -> Diagn
             'samples that came twice': status.duplicates,
             'times the clock of the source was set': len(status.clock_steps),
             'times the counter of an encoder rolled over': status.rollovers,
+            'samples whose speeds do not go with the rotations': status.disbelieved,
             **_stream(status.cadence, age),
         },
     )

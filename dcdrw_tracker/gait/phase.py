@@ -144,6 +144,8 @@ class PhaseStatus(NamedTuple):
     """Samples whose stamp was missing (zero), so that the time of their arrival took its place."""
     duplicates: int = 0
     """Samples that came again as they were, and so cost nothing."""
+    disbelieved: int = 0
+    """Samples since the last restart whose speeds do not go with the rotations: those of the rotations are used."""
     clock_steps: tuple[ClockStep, ...] = ()
     """The last of them, which were bridged: nothing was lost."""
     restarted: tuple[Restart, ...] = ()
@@ -278,6 +280,7 @@ class PhaseEstimator:
             rollovers=self._rolled_before + self._front.rollovers + self._rear.rollovers,
             unstamped=self._unstamped,
             duplicates=self._duplicates,
+            disbelieved=max(self._front.disbelieved, self._rear.disbelieved),
             clock_steps=tuple(self._clock_steps),
             restarted=tuple(self._restarted),
             hints=self._hints(),

@@ -14,6 +14,8 @@ LEAST_SLOPE_NS = 4_000_000
 """Over a shorter time a speed is none: samples of a burst are stamped as they arrive, one right after the other."""
 LEAST_COUNT = 1e-6
 """A finer encoder is none: rotations that are no multiples of a count [rad]."""
+LEAST_PACE = 0.05
+"""A wheel that is slower does not tell whether the speeds that its source gives are right [rad/s]."""
 LEARNING = 500
 """Samples of a moving wheel from which the count is learned."""
 LEAST_WIDTH = 1e-3
@@ -65,6 +67,10 @@ class Rotation:
         """ψ̇ [rad/s]; NaN where it is not known yet."""
         self.pace = 0.0 if math.isnan(rate) else rate
         """Mean speed of the last second [rad/s]."""
+        self._told = self.pace
+        """What the mean speed would be by the speeds that the source gives [rad/s]."""
+        self.disbelieved = 0
+        """Samples whose speed does not go with the rotations, and is not used."""
         self.speed = abs(self.pace)
         """The fastest that the wheel has turned of late [rad/s]."""
         self._highest = math.nextafter(alpha, 0.0)
@@ -206,8 +212,17 @@ class Rotation:
             self._unlearned -= 1
             self._count = _common_divisor(self._count, abs(turned))
         strikes = self._strikes(elapsed_ns, psi, tolerance.hysteresis)
-        self.rate = self._slope(stamp_ns, psi, bool(strikes), burst) if math.isnan(rate) else rate
-        self.pace += (moved - self.pace * dt) / (dt if dt > PACE_MEMORY else PACE_MEMORY)
+        memory = dt if dt > PACE_MEMORY else PACE_MEMORY
+        self.pace += (moved - self.pace * dt) / memory
+        slope = self._slope(stamp_ns, psi, bool(strikes), burst)
+        if math.isnan(rate):
+            rate = slope
+        else:
+            self._told += (rate - self._told) * dt / memory
+            if abs(self._told - self.pace) > 0.5 * max(abs(self.pace), LEAST_PACE):  # zero, say, or in other units
+                self.disbelieved += 1
+                rate = slope
+        self.rate = rate
         self.speed = abs(self.pace) if math.isnan(self.rate) else max(abs(self.pace), abs(self.rate))
         self.psi, self._raw, self._stamp_ns = psi, angle, stamp_ns
         return strikes

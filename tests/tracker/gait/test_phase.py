@@ -531,6 +531,21 @@ def test_a_counter_that_rolls_over_loses_nothing(
     assert [(fall.wheel, fall.steps) for fall in falls] == [(fall.wheel, fall.steps) for fall in plain_falls]
 
 
+@pytest.mark.parametrize('factor', [0.0, -1.0, math.degrees(1.0), 0.1, 1.0 / math.tau])
+def test_speeds_that_do_not_go_with_the_rotations_are_not_used(factor: float) -> None:
+    samples = walk(8.0).samples()
+    wrong = [s._replace(front=Turn(s.front.angle, factor * s.front.rate)) for s in samples]
+    phases, falls, status = run(wrong)
+    plain, plain_falls, plain_status = run(samples)
+    assert falls == plain_falls
+    assert [phase.phi.angle for phase in phases] == [phase.phi.angle for phase in plain]
+    settled = slice(100, None)
+    given, right = (np.array([phase.front.rate for phase in each[settled]]) for each in (phases, plain))
+    assert np.abs(given - right).mean() < 0.05
+    assert plain_status.disbelieved == 0
+    assert status.disbelieved > 0.9 * len(samples) or factor > 20.0  # beyond max_speed it is none at all
+
+
 def test_a_counter_of_unknown_width_asks_for_the_parameter_that_makes_it_good() -> None:
     samples = counted(walk(16.0).samples(), 4096, -2000, 6000)  # no power of two, nor whole turns, nor both ends alike
     assert run(samples)[2].hints == ('lone_jump',)
