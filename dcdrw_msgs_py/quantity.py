@@ -104,9 +104,9 @@ class Field(NamedTuple):
         return value
 
     def _question(self, value: float) -> str:
-        """Whether an impossible angle was meant in degrees."""
+        """Whether an impossible angle was meant in degrees; below 1 it looks like radians."""
         radians = math.radians(value) if math.isfinite(_as_float(value)) else math.nan
-        if self.quantity.unit != 'rad' or not math.isfinite(radians) or not self.quantity.allows(radians):
+        if self.quantity.unit != 'rad' or not abs(radians) >= math.radians(1.0) or not self.quantity.allows(radians):
             return ''
         return f': degrees? {value:g}° is {radians:.6g} rad'
 

@@ -56,6 +56,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; returns the exit status."""
+    if options.out.suffix not in ('.html', '.htm'):
+        raise ValueError(f'--out must end in .html, got {options.out}')
     tables = options.out.with_suffix('.csv')
     refuse_existing((options.out, tables), options.force)
     check_json(options)

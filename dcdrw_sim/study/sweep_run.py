@@ -38,7 +38,7 @@ def is_complete(path: Path, sweep: Sweep) -> bool:
     if not path.exists():
         return False
     with open_sweep(path) as dataset:
-        _require_same(path, sweep_of(dataset), sweep)
+        _require_same(path, sweep_of(dataset), sweep, 'choose another file (--force overwrites this one)')
     return True
 
 
@@ -105,7 +105,7 @@ class _Parts:
             except OSError:
                 raise OSError(f'another process is at work in {folder}') from None
             content = json.loads(specification.read_bytes())
-            _require_same(folder, Sweep.from_json(content['sweep']), sweep)
+            _require_same(folder, Sweep.from_json(content['sweep']), sweep, 'choose another file, or remove it')
             yield cls(folder, sweep, content['block_size'])
 
     def fill(self, executor: Executor, at_once: int) -> Iterator[Progress]:
@@ -182,7 +182,7 @@ def _write_whole(path: Path, write_to: Callable[[Any], object]) -> None:
     os.replace(unfinished, path)
 
 
-def _require_same(where: Path, there: Sweep, here: Sweep) -> None:
+def _require_same(where: Path, there: Sweep, here: Sweep, mend: str) -> None:
     """Refuse to mix two sweeps.
 
     Raises:
@@ -191,4 +191,4 @@ def _require_same(where: Path, there: Sweep, here: Sweep) -> None:
     """
     if there.to_json() != here.to_json():
         names = [name for name, a, b in zip(Sweep._fields, there, here, strict=True) if repr(a) != repr(b)]
-        raise ValueError(f'{where} holds a sweep that differs in {", ".join(names)}; choose another file, or remove it')
+        raise ValueError(f'{where} holds a sweep that differs in {", ".join(names)}; {mend}')

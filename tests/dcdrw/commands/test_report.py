@@ -189,6 +189,11 @@ def test_what_cannot_be_read_is_left_out_and_said(tmp_path, capsys):
     assert not (tmp_path / 'none.html').exists()
 
 
+def test_a_page_ends_in_html(tmp_path, capsys):
+    assert main(['report', str(tmp_path), '--out', 'today.txt']) == 2
+    assert capsys.readouterr().err == 'dcdrw report: --out must end in .html, got today.txt\n'
+
+
 def test_trials_of_one_name_are_told_apart(tmp_path):
     bags = [measured_bag(tmp_path / day / 'bag', 0.3) for day in ('monday', 'tuesday')]
     assert main(['report', *map(str, bags), '--out', str(tmp_path / 'r.html')]) == 0

@@ -54,6 +54,11 @@ def test_what_is_impossible_is_told_with_its_option(arguments, message):
         chosen(*arguments)
 
 
+def test_a_slope_that_is_told_in_degrees_is_not_asked_about():
+    with pytest.raises(ValueError, match=r'slope must be .* rad, got 0\.872\d* \(--slope-deg\)'):
+        chosen('--slope-deg', '50')
+
+
 def test_a_slope_in_degrees_is_asked_about(tmp_path):
     (tmp_path / 'rig.yaml').write_text('/**:\n  ros__parameters: {slope: 2}\n')
     with pytest.raises(ValueError, match=r'rad, got 2: degrees\? 2° is 0\.0349066 rad \(.*rig\.yaml\)'):
