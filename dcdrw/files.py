@@ -60,12 +60,12 @@ def write_whole(path: Path, force: bool = False) -> Iterator[Path]:
         OSError: the file cannot be written; the message names `path`.
 
     """
-    if _is_device(path):  # /dev/null, say: nothing takes its place
-        yield path
-        return
-    unfinished = path.with_name(f'.{path.stem}.{os.getpid()}{path.suffix}')
+    device = _is_device(path)  # /dev/null, say: nothing takes its place
+    unfinished = path if device else path.with_name(f'.{path.stem}.{os.getpid()}{path.suffix}')
     try:
         yield unfinished
+        if device:
+            return
         with unfinished.open('rb') as file:
             os.fsync(file.fileno())
         refuse_existing([path], force)
@@ -76,7 +76,8 @@ def write_whole(path: Path, force: bool = False) -> Iterator[Path]:
         raise OSError(error.errno, error.strerror or str(error), str(path)) from None
     finally:
         with suppress(OSError):
-            unfinished.unlink()
+            if not device:
+                unfinished.unlink()
 
 
 def write_text(path: Path, text: str, force: bool = False) -> None:

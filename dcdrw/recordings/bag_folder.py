@@ -67,6 +67,7 @@ def _described(folder: Path, files: list[Path]) -> Bag:
     told, notes = _metadata(folder / METADATA)
     names = told.get('relative_file_paths')
     named = [file for name in (names if isinstance(names, list) else []) if (file := _named(str(name), files))]
+    named = list(dict.fromkeys(named))  # one that is named twice has its messages once
     missing = [str(name) for name in names if not _named(str(name), files)] if isinstance(names, list) else []
     if missing:
         others = [file for file in files if file not in named]

@@ -1,7 +1,9 @@
 """Decompression that stays within bounds, whatever the compressed bytes claim to hold."""
 
 import shutil
+from collections.abc import Iterator
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -9,6 +11,8 @@ LARGEST = 256 * 2**20
 """Longest chunk, and longest message, that is read [bytes]."""
 ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
 _BLOCK = 2**17
+_PIECE = 2**10
+"""Compressed bytes of a file that are read at once: they never hold more than 32 MB."""
 _HIGHEST_RATIO = 1000
 _ALWAYS_ALLOWED = 256 * 2**20
 _KEPT_FREE = 64 * 2**20
@@ -54,15 +58,15 @@ def unpack_file(source: Path, target: Path) -> str:
     most = max(_ALWAYS_ALLOWED, _HIGHEST_RATIO * source.stat().st_size)
     written = 0
     with source.open('rb') as packed, target.open('wb') as out:
-        stream = _stream(packed, 'zstd')
+        parts = _unpacked(packed)
         while True:
             try:
-                part = stream.read(_BLOCK)
+                part = next(parts, None)
             except OSError:
                 raise
             except Exception as error:  # of any kind, for the content may be anything
                 return f'its compressed data end in damage after {written} bytes ({error})'
-            if not part:
+            if part is None:
                 return ''
             written += len(part)
             if written > most:
@@ -74,7 +78,21 @@ def unpack_file(source: Path, target: Path) -> str:
             out.write(part)
 
 
-def _stream(data: bytes | BinaryIO, compression: str) -> Any:
+def _unpacked(packed: BinaryIO) -> Iterator[bytes]:
+    """The content of a zstd file, frame after frame; unlike `_stream`, it tells where the last one is cut off."""
+    from zstandard import ZstdDecompressor
+
+    frame: Any = None
+    for piece in iter(partial(packed.read, _PIECE), b''):
+        while piece:
+            frame = frame or ZstdDecompressor().decompressobj()
+            yield frame.decompress(piece)
+            piece, frame = (frame.unused_data, None) if frame.eof else (b'', frame)
+    if frame:
+        raise ValueError('the file is cut off')
+
+
+def _stream(data: bytes, compression: str) -> Any:
     if compression == 'zstd':
         from zstandard import ZstdDecompressor
 
@@ -83,4 +101,4 @@ def _stream(data: bytes | BinaryIO, compression: str) -> Any:
 
     from lz4.frame import LZ4FrameFile
 
-    return LZ4FrameFile(BytesIO(data) if isinstance(data, bytes) else data)
+    return LZ4FrameFile(BytesIO(data))

@@ -290,6 +290,31 @@ def test_parts_of_a_killed_recorder_are_one_recording(tmp_path):
     assert (stamps, damage) == (list(range(220)), [])
 
 
+@pytest.mark.parametrize('share', [0.9, 0.9999])
+def test_a_compressed_file_that_is_cut_off_is_told_of_and_read_as_far_as_it_goes(share, tmp_path):
+    bag = write_bag(tmp_path / 'bag', MESSAGES * 200)
+    packed = zstandard.compress(next(bag.glob('*.mcap')).read_bytes(), level=1)
+    cut = tmp_path / 'cut.mcap.zstd'
+    cut.write_bytes(packed[: int(share * len(packed))])
+    with Recording(cut) as recording:
+        assert 'the file is cut off' in recording.damage[0]
+        list(recording.messages(['/joint_states']))
+    whole = tmp_path / 'two_frames.mcap.zstd'
+    whole.write_bytes(b''.join(map(zstandard.compress, (next(bag.glob('*.mcap')).read_bytes(), b''))))
+    with Recording(whole) as recording:
+        assert recording.damage == []
+        assert len(list(recording.messages(['/joint_states']))) == 200 * len(MESSAGES)
+
+
+def test_a_file_that_the_metadata_name_twice_is_read_once(tmp_path):
+    bag = write_bag(tmp_path / 'bag', MESSAGES)
+    metadata = bag / 'metadata.yaml'
+    metadata.write_text(metadata.read_text().replace('  - bag.mcap\n', '  - bag.mcap\n' * 3))
+    assert metadata.read_text().count('- bag.mcap') == 3
+    with Recording(bag) as recording:
+        assert len(list(recording.messages(['/joint_states']))) == len(MESSAGES)
+
+
 def test_broken_part_costs_itself(tmp_path):
     folder = tmp_path / 'bag'
     folder.mkdir()
