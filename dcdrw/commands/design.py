@@ -163,11 +163,12 @@ def run(options: argparse.Namespace) -> int:
     chosen = {name: assess(task, *pair, tolerance) for name, pair in zip((FASTEST, FORGIVING), best, strict=True)}
     drawn = _drawn(options, task.rig)
     if drawn:
-        candidates = grid.order()[:CANDIDATES]
-        ks, bs = grid.k[candidates], grid.b[candidates]
         if parts:
             pairs = (working(ranked) or ranked)[:CANDIDATES]
             ks, bs = np.array([(pair.spring.value, pair.dashpot.value) for pair in pairs]).T
+        else:
+            candidates = grid.order()[:CANDIDATES]
+            ks, bs = grid.k[candidates], grid.b[candidates]
         few = {name: column[:DRAWN] for name, column in drawn.items()}
         chosen[SUREST] = assess(task, *surest(task, ks, bs, few), tolerance)
     if options.k:

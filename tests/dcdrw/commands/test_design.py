@@ -47,6 +47,15 @@ def test_best_pair_of_parts_with_card_and_numbers(tmp_path, parts, capsys):
     assert (tmp_path / 'out' / 'card.png').read_bytes().startswith(b'\x89PNG')
 
 
+def test_parts_for_an_uncertain_rig_need_no_folder_for_a_card(tmp_path, parts, capsys):
+    rig = tmp_path / 'rig.yaml'
+    rig.write_text('/**: {ros__parameters: {k: 5.25}}\nuncertainty: {ros__parameters: {standard_errors: {b: 5.0}}}\n')
+    assert main(['design', '--available', str(parts), '--rig', str(rig), '--seconds', '8']) == 0
+    output = capsys.readouterr().out
+    assert 'surest' in output
+    assert 'in step from every start on' in output
+
+
 def test_what_swings_beyond_the_band_is_not_recommended_and_what_is_the_monitor_has_seen(tmp_path, capsys):
     path = tmp_path / 'parts.csv'
     path.write_text('kind,value\nspring,16\ndashpot,10\n')
