@@ -1,6 +1,8 @@
 """Files of strangers: each is read, or refused in one line that names it, in bounded time and memory."""
 
+import os
 import random
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -61,11 +63,25 @@ def test_rig_files_gone_wrong_are_refused(tmp_path_factory, content, reason):
 
 
 @pytest.mark.parametrize(
-    ('content', 'reason'),
+    ('kind', 'content', 'reason'),
     [
-        (b'kind,value,name\nspring,5,"x\n' + b'y' * 200_000 + b'\ndashpot,5,y\n', 'field larger than'),
-        (b'kind,value,name\nspring,5,\xff\xfe\ndashpot,5,y\n', 'line 2: byte 0xff is not UTF-8 text'),
+        ('parts', b'kind,value,name\nspring,5,"x\n' + b'y' * 200_000 + b'\ndashpot,5,y\n', 'field larger than'),
+        ('legs', b'time,left_force\n0.0,\xff\xfe\n0.1,5\n', 'line 2: byte 0xff is not UTF-8 text'),
     ],
+    ids=['parts', 'legs'],
 )
-def test_tables_gone_wrong_are_refused(tmp_path_factory, content, reason):
-    assert reason in check(READERS['parts'], content, tmp_path_factory.mktemp('parts'))
+def test_tables_gone_wrong_are_refused(tmp_path_factory, kind, content, reason):
+    assert reason in check(READERS[kind], content, tmp_path_factory.mktemp(kind))
+
+
+@pytest.mark.parametrize('kind', ['rig', 'camera', 'cases', 'parts', 'legs'])
+def test_a_pipe_that_nobody_writes_to_keeps_nobody_waiting_and_another_is_read(tmp_path, kind):
+    reader = READERS[kind]
+    os.mkfifo(tmp_path / 'pipe.csv')
+    with pytest.raises(ValueError, match='pipe'):
+        reader.read(tmp_path / 'pipe.csv')
+    end, begin = os.pipe()  # as the shell's <(command)
+    os.write(begin, reader.seeds[0])
+    os.close(begin)
+    reader.read(Path(f'/dev/fd/{end}'))
+    os.close(end)

@@ -7,6 +7,7 @@ import re
 import resource
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -76,6 +77,9 @@ def test_a_file_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / 'file').write_text('')
     with pytest.raises(OSError, match=r'file/below\.txt'):
         write_text(tmp_path / 'file' / 'below.txt', '')
+    with pytest.raises(OSError, match='/dev/full'):
+        write_text(Path('/dev/full'), 'text')
+    assert Path('/dev/full').exists()
 
 
 FULL = """
