@@ -32,7 +32,7 @@ from dcdrw.trials.rolling import rolling_samples
 from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_msgs_py.yaml_file import yaml_text
 from dcdrw_sim.identification.findings import COMBINATIONS, combinations, parameters
-from dcdrw_sim.identification.fit import Explained, Fit, Problem, identify
+from dcdrw_sim.identification.fit import OWN, START, Explained, Fit, Problem, identify
 from dcdrw_sim.identification.samples import Samples, free_rolling
 from dcdrw_sim.identification.unknowns import Knowledge, knowledge
 from dcdrw_sim.model.start import start
@@ -144,7 +144,7 @@ def ideal(known: Knowledge, true: RigParams, motion: Run, trial: Explained) -> F
     samples = trial.samples
     at = motion.at(np.array([samples.begins]))
     coordinates = [unknown.coordinate(true.resolved()) for unknown in known.unknowns]
-    point = np.concatenate([coordinates, at.theta1, at.omega1, at.theta2, at.omega2, [0.0, 0.0]])
+    point = np.concatenate([coordinates, at.theta1, at.omega1, at.theta2, at.omega2, np.zeros(OWN - START)])
     problem = Problem(known, [samples], [trial.deviation])
     return Fit(problem, point, problem.covariance(point), ())
 

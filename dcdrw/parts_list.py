@@ -30,14 +30,15 @@ COLUMNS = {
     **dict.fromkeys(('name', 'part', 'part_number', 'bezeichnung', 'artikel'), 'name'),
     **dict.fromkeys(('max_force', 'maximum_force', 'max_kraft'), 'max_force'),
     **dict.fromkeys(('max_stroke', 'maximum_stroke', 'stroke', 'travel', 'hub'), 'max_stroke'),
+    **dict.fromkeys(('free_length', 'l0'), 'free_length'),
     **dict.fromkeys(('max_speed', 'maximum_speed', 'max_velocity'), 'max_speed'),
 }
 """Headings that are known, in lower case, and what they head; one of a kind heads values of that kind."""
 SEPARATORS = '\t;|,'
 FIRST_LINES = 20
 """The heading is sought in so many lines: lists begin with titles and remarks."""
-LIMITS = {'max_force': 'N', 'max_stroke': 'm', 'max_speed': 'm/s'}
-"""Columns of rated limits, with the units that they have where none stands there."""
+MORE = {'max_force': 'N', 'max_stroke': 'm', 'max_speed': 'm/s', 'free_length': 'm'}
+"""Other columns of numbers, with the units that they have where none stands there."""
 VALUES = {SPRING: 'N/m', DASHPOT: 'N·s/m'}
 _POUND = 4.4482216152605
 _WEIGHT = 9.80665
@@ -90,8 +91,8 @@ def read_parts(path: Path) -> PartsList:
     Args:
         path: of a text whose columns are separated by commas, semicolons, tabs or bars. Its heading names `kind`
             (spring, dashpot or damper) and `value`, or `stiffness` and `damping`, and may name `name`, `max_force`,
-            `max_stroke` and `max_speed`. Units stand in the heading, as `value [N/mm]`, in a column `unit`, or in the
-            cell, as `0.1 N·s/mm`; else they are SI.
+            `max_stroke`, `max_speed` and `free_length`. Units stand in the heading, as `value [N/mm]`, in a column
+            `unit`, or in the cell, as `0.1 N·s/mm`; else they are SI.
 
     Raises:
         ValueError: it is no such list, or offers no spring or no dashpot.
@@ -177,12 +178,12 @@ def _part(cells: dict[str, tuple[str, str]], decimal_comma: bool) -> Part:
     cell, unit = cells[kind] if cells.get(kind, ('', ''))[0].strip() else cells.get('value', ('', ''))
     unit = cells.get('unit', ('', ''))[0].strip() or unit
     value = _quantity('value', cell, unit, VALUES[kind], decimal_comma)
-    limits = {
+    more = {
         name: _quantity(name, *cells[name], unit, decimal_comma)
-        for name, unit in LIMITS.items()
+        for name, unit in MORE.items()
         if cells.get(name, ('', ''))[0].strip()
     }
-    return Part(kind, value, cells.get('name', ('', ''))[0].strip(), **limits)
+    return Part(kind, value, cells.get('name', ('', ''))[0].strip(), **more)
 
 
 def _quantity(name: str, cell: str, unit: str, wanted: str, decimal_comma: bool) -> float:

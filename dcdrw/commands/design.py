@@ -13,7 +13,7 @@ from dcdrw.console import Bar, add_json, check_json, positive, tell, tell_where
 from dcdrw.drawings.design_card import draw_card
 from dcdrw.drawings.figure_files import add_formats, figure_files, write_figure
 from dcdrw.files import add_force, refuse_existing, to_json, write_csv, write_text
-from dcdrw.pairs_table import COLUMNS, load_record, pair_lines, pair_records, working
+from dcdrw.pairs_table import COLUMNS, load_record, order_record, pair_lines, pair_records, working
 from dcdrw.parts_list import PartsList, read_parts
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params, read_uncertainty
 from dcdrw.trials.monitored import monitored
@@ -40,7 +40,7 @@ from dcdrw_sim.study.design import (
     score,
     search,
 )
-from dcdrw_sim.study.loads import preload
+from dcdrw_sim.study.loads import Order, order
 from dcdrw_sim.study.outlook import CANDIDATES, DRAWN, FINAL, Outlook, outlook, surest
 from dcdrw_sim.study.parts import DASHPOT, SPRING, Pair, Part, rank
 from dcdrw_sim.study.sweep import default_seconds
@@ -77,7 +77,8 @@ are as likely; the surest is the best on the worst of these.
 --available takes a table with a heading, kind,value,name, and a row for each part, separated by commas, semicolons,
 tabs or bars (config/parts.csv shows one). Kind is spring or dashpot, or damper; units stand in the heading (value
 [N/mm]), in a column unit, or in the cell (0.1 N·s/mm), else they are N/m and N·s/m. Where it has columns max_force,
-max_stroke and max_speed, no pair is recommended that asks for more of a part. Every pair is judged, in the place of the
+max_stroke and max_speed, no pair is recommended that asks for more of a part; from a column free_length, the card tells
+which rods to add. Every pair is judged, in the place of the
 search, and those that come into step are listed, the best first; --out writes all of them to pairs.csv.
 
 examples:
@@ -284,11 +285,11 @@ def summary_lines(
             yield f'  {"monitor":<14} synchronized from each of {starts} starts, in as many steps'
         else:
             yield f'  {"monitor":<14} NOT RECOMMENDED: not synchronized for good from each of the starts'
-        for heading, content in told(task, found, tolerance):
+        for heading, content in told(task, found, parts, tolerance):
             yield f'  {heading:<14} {content}'
 
 
-def told(task: Task, found: Assessment, tolerance: float) -> Iterator[tuple[str, str]]:
+def told(task: Task, found: Assessment, parts: Sequence[Part], tolerance: float) -> Iterator[tuple[str, str]]:
     """What there is to say of a coupler: headings and contents."""
     if math.isnan(found.worst_steps):
         settling = sum(not math.isnan(steps) for steps in found.steps)
@@ -312,7 +313,7 @@ def told(task: Task, found: Assessment, tolerance: float) -> Iterator[tuple[str,
                 f'the damper takes {found.damper_loss:.2f} J/m'
             ),
         )
-    yield from _bought(task, found)
+    yield from _bought(task, found, parts)
     yield 'margins', 'in step with ' + ', '.join(f'{name} {_margin(one)}' for name, one in found.margins.items())
     slope = found.margins['slope']
     yield (
@@ -331,7 +332,7 @@ def told(task: Task, found: Assessment, tolerance: float) -> Iterator[tuple[str,
     )
 
 
-def _bought(task: Task, found: Assessment) -> Iterator[tuple[str, str]]:
+def _bought(task: Task, found: Assessment, parts: Sequence[Part]) -> Iterator[tuple[str, str]]:
     """What spring and dashpot must be like."""
     loads, rig = found.loads, task.rig.resolved()
     if not math.isnan(loads.force):
@@ -342,16 +343,38 @@ def _bought(task: Task, found: Assessment) -> Iterator[tuple[str, str]]:
             f'{loads.speed:.2f} m/s in the damper'
             + ('' if math.isnan(loads.heat) else f', {loads.heat:.0f} J of heat a minute'),
         )
-    force = preload(rig, found.k)
+    ordered = _order(task, found, parts)
+    if not math.isnan(ordered.free_length):
+        more, least = '', ordered.least_free_length
+        if ordered.free_length == least:
+            more = ' or more'
+        elif ordered.free_length < least and math.isinf(_spring(parts, found.k).max_stroke):
+            more = f', TOO SHORT: at least {1e3 * least:.0f} mm bear this'
+        stretched = (
+            f'it is lengthened by up to {1e3 * ordered.lengthened:.0f} mm and shortened by up to '
+            f'{1e3 * ordered.shortened:.0f} mm'
+        )
+        yield 'spring', f'free length {1e3 * ordered.free_length:.0f} mm{more}; {stretched}'
+    rods = '' if math.isnan(ordered.rods) else f'{1e3 * ordered.rods:.0f} mm of rods and eyes; '
     yield (
-        'spring',
-        f'without force where the hubs are {rig.D0:.3f} m apart (D0), '
+        'mounting',
+        f'{rods}without force where the hubs are D0 = {rig.D0:.3f} m apart, '
         + (
-            'as they are at 50 %: no preload'
-            if abs(force) < LEAST_PRELOAD
-            else f'so that it {"pulls" if force > 0.0 else "pushes"} with {abs(force):.1f} N at 50 %'
+            'as at 50 %: no preload'
+            if abs(ordered.preload) < LEAST_PRELOAD
+            else f'and it {"pulls" if ordered.preload > 0.0 else "pushes"} with {abs(ordered.preload):.1f} N at 50 %'
         ),
     )
+
+
+def _order(task: Task, found: Assessment, parts: Sequence[Part]) -> Order:
+    """The spring to order; its free length is that on the list where it has one."""
+    return order(task.rig, found.k, found.loads, _spring(parts, found.k).free_length)
+
+
+def _spring(parts: Sequence[Part], k: float) -> Part:
+    """The first one of this stiffness on the list, or one of which nothing more is known."""
+    return next((part for part in parts if part.kind == SPRING and part.value == k), Part(SPRING, k))
 
 
 def warnings(task: Task, found: Assessment) -> Iterator[str]:
@@ -377,7 +400,7 @@ def _texts(task: Task, chosen: dict[str, Assessment], parts: Sequence[Part], tol
                 f'{name.upper()}   {_coupler(task, found, parts)}',
                 *(
                     f'{heading}: {content}'
-                    for heading, content in told(task, found, tolerance)
+                    for heading, content in told(task, found, parts, tolerance)
                     if heading != 'from each'
                 ),
             ]
@@ -426,8 +449,8 @@ def json_record(
                 'speed': found.speed,
                 'damper_loss': found.damper_loss,
                 'loads': load_record(found),
-                'spring_free_length': task.rig.resolved().D0,
-                'spring_preload': preload(task.rig, found.k),
+                'hub_distance_at_rest': task.rig.resolved().D0,
+                **order_record(_order(task, found, parts)),
                 'stall_slope': found.stall_slope,
                 'margins': {
                     name: {

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dcdrw.console import add_json, check_json, number, tell, tell_where
+from dcdrw.console import add_json, check_json, number, positive, tell, tell_where
 from dcdrw.drawings.figure_files import add_formats, figure_files, write_figure
 from dcdrw.files import add_force, refuse_existing, to_json, write_text, write_whole
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file, read_uncertainty, write_changed
@@ -35,11 +35,13 @@ from dcdrw_sim.identification.findings import (
     profiles,
     together,
 )
-from dcdrw_sim.identification.fit import Fit, identify
+from dcdrw_sim.identification.fit import ZERO, Fit, identify
 from dcdrw_sim.identification.unknowns import correlation, knowledge
 from dcdrw_sim.model.presets import PRESETS
 
 FIGURE, RESULT, RIG = 'identification', 'identification.json', 'rig.yaml'
+SLOW = 5.0
+"""Where what is left of a trial has more memory than this, it is told."""
 MOST_GAINS = 3
 """Measurements that are told."""
 _EPILOG = """\
@@ -75,6 +77,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('recordings', type=Path, nargs='+', metavar='RECORDING')
     parser.add_argument('--rig', type=Path, required=True, metavar='RIG.yaml', help='what is known of the rig')
     parser.add_argument('--fix', type=_names, default=(), metavar='mass,slope', help='these are as the rig file says')
+    parser.add_argument(
+        '--zero-deg',
+        type=positive,
+        default=math.degrees(ZERO),
+        metavar='DEG',
+        help='to what the zeros of both wheels are known (default: %(default)g)',
+    )
     parser.add_argument('--from', dest='begin', type=number, default=0.0, metavar='S', help='time in the trials [s]')
     parser.add_argument('--to', dest='end', type=number, default=math.inf, metavar='S', help='time in the trials [s]')
     parser.add_argument(
@@ -112,7 +121,7 @@ def run(options: argparse.Namespace) -> int:
             trials.append(rolling_samples(trial, whole.motion, known.rig, options.begin, options.end))
         except ValueError as error:
             raise ValueError(f'{path}: {error}') from None
-    fit = identify(known, trials)
+    fit = identify(known, trials, math.radians(options.zero_deg))
     outcome = Outcome(
         fit,
         parameters(fit),
@@ -156,6 +165,8 @@ def report(recordings: Sequence[Path], outcome: Outcome) -> Iterator[str]:
             f'residuals {math.degrees(trial.noise):.3f}° rms, {outliers} of {count} left out as outliers'
         )
         yield f'  {_explanation(left)}'
+        if trial.memory > SLOW:
+            yield f'  What is left goes on from sample to sample: {trial.memory:.0f} of them count as one.'
     yield ''
     yield f'{"parameter":<20} {"value":>10} {"± error":>10}   90 % interval          told by'
     for finding in outcome.found:
@@ -243,14 +254,14 @@ def record(recordings: Sequence[Path], outcome: Outcome) -> dict[str, Any]:
                 'seconds': float(trial.samples.seconds[-1]),
                 'start': dict(zip(('theta1', 'omega1', 'theta2', 'omega2'), trial.start.tolist(), strict=True)),
                 'start_errors': starts.tolist(),
-                'zeros': trial.zeros.tolist(),
-                'zero_errors': zeros.tolist(),
+                'zeros': trial.systematic[:, 0].tolist(),
+                'zero_errors': systematic[:, 0].tolist(),
                 'noise': trial.noise,
                 'memory': trial.memory,
                 'outliers': int(trial.outliers.sum()),
                 'unexplained': left,
             }
-            for trial, left, (starts, zeros) in zip(fit.trials, outcome.misfits, _own_errors(fit), strict=True)
+            for trial, left, (starts, systematic) in zip(fit.trials, outcome.misfits, _own_errors(fit), strict=True)
         ],
         'next': [gain._asdict() for gain in outcome.gains],
     }

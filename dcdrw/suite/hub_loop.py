@@ -18,6 +18,7 @@ from dcdrw_sim.map.return_map import Complexes, spectrum
 from dcdrw_sim.model.dynamics import State, accelerations, stance_distance
 from dcdrw_sim.model.start import uncoupled_speed
 from dcdrw_sim.model.wheel import kept
+from dcdrw_sim.motion.runge_kutta import runge_kutta
 from dcdrw_sim.rig.person import natural_cadence
 
 SETTLING, WATCHED = 8, 8
@@ -127,29 +128,24 @@ class HubLoop:
 
     def _on(self, rear: Rear, step: int, theta1: float, torque: float, h: float) -> Rear:
         """The rear wheel a time h later: a step of Runge and Kutta, cut where the wheel strikes."""
-        theta, omega = self._runge_kutta(rear, step, theta1, torque, h)
+        theta, omega = self._between(rear, step, theta1, torque, h)
         alpha = self._rig.rear.alpha
         if theta < alpha or h == 0.0:
             return Rear(theta, omega, rear.steps)
         to_strike = h
         for _ in range(4):  # Newton's method, by which each turn doubles the digits
             to_strike -= (theta - alpha) / omega
-            theta, omega = self._runge_kutta(rear, step, theta1, torque, to_strike)
+            theta, omega = self._between(rear, step, theta1, torque, to_strike)
         struck = Rear(-alpha, omega * kept(self._rig.rear), rear.steps + 1)
-        return Rear(
-            *self._runge_kutta(struck, step, theta1 + self._pace * to_strike, torque, h - to_strike), struck.steps
-        )
+        return Rear(*self._between(struck, step, theta1 + self._pace * to_strike, torque, h - to_strike), struck.steps)
 
-    def _runge_kutta(self, rear: Rear, step: int, theta1: float, torque: float, h: float) -> tuple[float, float]:
+    def _between(self, rear: Rear, step: int, theta1: float, torque: float, h: float) -> tuple[float, float]:
+        """θ2 and θ2′ a time h later, without a strike."""
         S = stance_distance(self._rig, step + 1, rear.steps)
 
-        def rates(t: float, theta: float, omega: float) -> tuple[float, float]:
-            state = State(theta1 + self._pace * t, self._pace, theta, omega)
-            return omega, float(accelerations(self._rig, state, S, 0.0, (0.0, torque))[1])
+        def rates(t: Floats, y: Floats) -> Floats:
+            state = State(theta1 + self._pace * float(t), self._pace, *y.tolist())
+            return np.array([state.omega2, float(accelerations(self._rig, state, S, 0.0, (0.0, torque))[1])])
 
-        theta, omega = rear.theta, rear.omega
-        v1, a1 = rates(0.0, theta, omega)
-        v2, a2 = rates(0.5 * h, theta + 0.5 * h * v1, omega + 0.5 * h * a1)
-        v3, a3 = rates(0.5 * h, theta + 0.5 * h * v2, omega + 0.5 * h * a2)
-        v4, a4 = rates(h, theta + h * v3, omega + h * a3)
-        return theta + h / 6.0 * (v1 + 2.0 * (v2 + v3) + v4), omega + h / 6.0 * (a1 + 2.0 * (a2 + a3) + a4)
+        theta, omega = runge_kutta(rates, np.array([rear.theta, rear.omega]), h).tolist()
+        return theta, omega

@@ -24,8 +24,8 @@ def draw_identification(fit: Fit, found: Sequence[Finding], profiles: Sequence[P
 
     """
     lower = math.ceil(len(profiles) / COLUMNS)
-    figure = new_figure(PAGE, 2.1 * len(fit.trials) + 1.5 * lower, 'the figure of an identification')
-    grid = figure.add_gridspec(len(fit.trials) + lower, COLUMNS, height_ratios=[2.1] * len(fit.trials) + [1.5] * lower)
+    figure = new_figure(PAGE, 2.1 * len(fit.trials) + 1.7 * lower, 'the figure of an identification')
+    grid = figure.add_gridspec(len(fit.trials) + lower, COLUMNS, height_ratios=[2.1] * len(fit.trials) + [1.7] * lower)
     for row, trial in enumerate(fit.trials):
         _draw_phase(figure.add_subplot(grid[row, :2]), fit, trial, row)
         _draw_left(figure.add_subplot(grid[row, 2]), trial)
@@ -85,5 +85,6 @@ def _draw_profile(axes: Any, finding: Finding, profile: Profile) -> None:
     axes.axhline(NORMAL_90**2, color='0.7', lw=0.8)
     axes.axvspan(finding.low, finding.high, color='0.93', zorder=0)
     axes.set(
-        title=f'{finding.name.replace("_", " ")} ({finding.source.value})', xlabel=finding.unit or ' ', ylim=(-0.2, 6.0)
+        title=f'{finding.name.replace("_", " ")}\n{finding.source.value}', xlabel=finding.unit or ' ', ylim=(-0.2, 6.0)
     )
+    axes.locator_params(axis='x', nbins=3)

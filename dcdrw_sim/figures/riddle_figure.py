@@ -7,7 +7,7 @@ import numpy as np
 
 from dcdrw_msgs_py.in_step import BAND_PERCENT
 from dcdrw_sim.figures.style import BAND, BLACK, BLUE, ORANGE, VERMILION
-from dcdrw_sim.study.riddle import SPANS, START, STEPS, Course, causes, course
+from dcdrw_sim.study.riddle import SPANS, START, STEPS, Course, causes, course_of
 
 SHOWN = 10
 """Strikes on the left."""
@@ -19,11 +19,17 @@ def draw_riddle(strikes: Any, times: Any) -> None:
     """Phase at the first strikes from 21.6 %, and against time, where the causes part."""
     for axes in (strikes, times):
         axes.axhspan(50.0 - BAND_PERCENT, 50.0 + BAND_PERCENT, color=BAND, alpha=0.18, linewidth=0)
-    found = [(cause.name, course(cause.rig)) for cause in causes()]
+    found = [(cause.name, course_of(cause)) for cause in causes()]
     for number, (name, one) in enumerate(found):
         told = number < len(COLOURS)
         style = {'color': COLOURS[number] if told else '0.7', 'zorder': 3 if told else 1}
-        label = name if told else 'mass, gyration, restitution, friction' if number == len(COLOURS) else None
+        label = (
+            name
+            if told
+            else 'mass, gyration, restitution, friction, one-way damper'
+            if number == len(COLOURS)
+            else None
+        )
         strikes.plot(range(SHOWN + 1), [100.0 * START, *_phases(one)[:SHOWN]], marker='.', label=label, **style)
         if told:
             times.plot(*_cut(one), marker='.', markersize=3, linewidth=0.8, **style)

@@ -10,7 +10,7 @@ import numpy as np
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.rolling import default_rest_length
 from dcdrw_msgs_py.values import Floats
-from dcdrw_sim.identification.fit import Explained, Fit, Problem
+from dcdrw_sim.identification.fit import OWN, START, Explained, Fit, Problem
 from dcdrw_sim.identification.unknowns import Form, Knowledge, correlation
 from dcdrw_sim.model.start import start
 from dcdrw_sim.model.wheel import kept
@@ -72,6 +72,8 @@ class Combination(NamedTuple):
     unit: str
     doc: str
     value: Callable[[RigParams], float]
+    least: float = -math.inf
+    """Lower bound."""
 
 
 class Gain(NamedTuple):
@@ -122,6 +124,7 @@ COMBINATIONS = (
         'm/s²',
         'F_c / m',
         lambda rig: 2.0 * rig.coupler_friction / (rig.front.mass + rig.rear.mass),
+        0.0,
     ),
     Combination(
         'drive',
@@ -154,10 +157,8 @@ def combinations(fit: Fit) -> list[Finding]:
         value, gradient = _gradient(fit.after, combination.value)
         error, before = (math.sqrt(gradient @ each @ gradient) for each in (fit.covariance, fit.known.covariance))
         if before > 0.0:
-            reach = NORMAL_90 * error
-            found.append(
-                Finding(combination.name, combination.unit, value, error, value - reach, value + reach, error / before)
-            )
+            low, high = max(value - NORMAL_90 * error, combination.least), value + NORMAL_90 * error
+            found.append(Finding(combination.name, combination.unit, value, error, low, high, error / before))
     return found
 
 
@@ -206,7 +207,7 @@ def _further(fit: Fit, phase: float) -> Floats:
     state[0] += 1e-3  # away from its guard
     samples = trial.samples._replace(steps=1)
     problem = Problem(after, [samples], [trial.deviation])
-    return problem.information(np.concatenate([fit.coordinates, state, [0.0, 0.0]]))
+    return problem.information(np.concatenate([fit.coordinates, state, np.zeros(OWN - START)]))
 
 
 def _gain(fit: Fit, what: str, covariance: Floats) -> Gain:

@@ -1,6 +1,6 @@
 """Least squares: the rig, and each trial's start, under which the model's samples are nearest to those of the trials.
 
-Of each trial six more numbers are sought: its start, and by what the zeros of both wheels' rotations are off. Samples
+Of each trial more numbers are sought: its start, and the systematic errors of both wheels' rotations. Samples
 of an angle are continuous functions of all parameters, strikes and all: only speeds jump. Their derivatives are
 differences of trajectories that run side by side, as one ensemble.
 """
@@ -25,7 +25,8 @@ TOLERANCE = 1e-13
 STEP = 1e-6
 """Over which derivatives are taken, in the widths of what is known, and in rad and rad/s of a start."""
 WINDOWS = 1.5, 3.0, 6.0
-"""The first part of each trial is explained before more of it [s]: so far a phase drifts by less than a step."""
+"""The first part of each trial is explained before more of it [s]: so far a phase drifts by less than a step. Each is
+twice the one before, and so on to the end of long trials."""
 ROBUST = 4.0
 """Residuals of more than so many standard deviations weigh less and less."""
 OUTLYING = 5.0
@@ -42,9 +43,12 @@ WORTHWHILE = 0.1
 EVALUATIONS = 60
 """At most, of one search."""
 ZERO = math.radians(0.02)
-"""To what a wheel's zero is taken to be known, as well as `dcdrw calibrate` finds it [rad]."""
-OWN = 6
-"""Numbers of a trial's own: θ1, ω1, θ2, ω2 at its first sample, and the zeros of ψ1 and ψ2."""
+"""To what a wheel's zero is taken to be known by default, as well as `dcdrw calibrate` finds it [rad]."""
+PARTS, REPEATED = 12, math.radians(0.005)
+"""In each of so many parts of the stance angle samples share an error that repeats from step to step, as a camera's do
+that sees tags at the same angles; of this standard deviation [rad]."""
+START, OWN = 4, 4 + 2 * (1 + PARTS)
+"""Numbers of a trial's own: θ1, ω1, θ2, ω2 at its first sample, and the systematic errors of ψ1 and ψ2."""
 Mask = NDArray[np.bool_]
 
 
@@ -54,8 +58,8 @@ class Explained(NamedTuple):
     samples: Samples
     start: Floats
     """[θ1, ω1, θ2, ω2] at the first sample."""
-    zeros: Floats
-    """What ψ1 and ψ2 were measured to be too great [rad]."""
+    systematic: Floats
+    """What ψ1 and ψ2 were measured to be too great, everywhere and in each part [rad], shape (2, 1 + PARTS)."""
     residuals: Floats
     """What was measured less what the model has [rad], shape (T, 2)."""
     outliers: Mask
@@ -79,6 +83,7 @@ class Problem:
         trials: to be explained.
         deviations: standard deviation of each trial's samples [rad].
         used: samples of each trial that count, shape (T, 2); None: all.
+        zero: to what the wheels' zeros are known [rad].
 
     """
 
@@ -88,8 +93,9 @@ class Problem:
         trials: Sequence[Samples],
         deviations: Sequence[float],
         used: Sequence[Mask] | None = None,
+        zero: float = ZERO,
     ) -> None:
-        self.known, self.trials, self._deviations = known, trials, deviations
+        self.known, self.trials, self._deviations, self._zero = known, trials, deviations, zero
         self._used = used or [np.ones(trial.rotations.shape, bool) for trial in trials]
         self._size = len(known.unknowns)
         self._steps = STEP * np.sqrt(np.diag(known.covariance))
@@ -97,7 +103,8 @@ class Problem:
         self._at: Floats = np.empty(0)
         self._found: tuple[Floats, Floats] = (self._at, self._at)
         front, rear = known.rig.front, known.rig.rear
-        farthest = np.tile([front.alpha, math.inf, rear.alpha, math.inf, math.inf, math.inf], len(trials))
+        self._shares = [_shares(trial, np.array([front.alpha, rear.alpha])) for trial in trials]
+        farthest = np.tile([front.alpha, math.inf, rear.alpha, math.inf, *[math.inf] * (OWN - START)], len(trials))
         low, high = known.bounds()
         self.low, self.high = np.concatenate([low, -farthest]), np.concatenate([high, farthest])
 
@@ -110,11 +117,13 @@ class Problem:
         }
         rig, samples = self.known.rig, self.trials[trial]
         rig = rig._replace(S0=float(stance_distance(rig.front, rig.rear, rig.S0, samples.steps, 0)))
-        pairs, starts, zeros = spread(rig, len(points), columns), points[:, -OWN:-2], points[:, -2:]
-        return sample_pairs(pairs, starts, samples.seconds, TOLERANCE) + zeros[:, None]
+        starts, systematic = np.split(points[:, self._size :], [START], axis=1)
+        rotations = sample_pairs(spread(rig, len(points), columns), starts, samples.seconds, TOLERANCE)
+        errors = np.einsum('twk,nwk->ntw', self._shares[trial], systematic.reshape(len(points), 2, -1))
+        return np.asarray(rotations + errors)
 
     def residuals(self, x: Floats) -> Floats:
-        """Weighed residuals, then what zeros and unknowns are off from what was known, in standard deviations."""
+        """Weighed residuals; then, in standard deviations, by what systematic errors and unknowns are off."""
         return self._evaluate(x)[0]
 
     def jacobian(self, x: Floats) -> Floats:
@@ -126,17 +135,23 @@ class Problem:
             return self._found
         size, residuals, blocks = self._size, [], []
         for index, (samples, used, deviation) in enumerate(zip(self.trials, self._used, self._deviations, strict=True)):
-            own = [*range(size), *self._own(index)]
-            steps = np.concatenate([self._steps, np.full(OWN, STEP)])
-            steps = np.where(x[own] + steps > self.high[own], -steps, steps)
-            rotations = self.rotations(index, x[own] + np.vstack([np.zeros(len(own)), np.diag(steps)]))
+            mine = self._own(index)
+            moved, added = [*range(size), *mine[:START]], mine[START:]
+            steps = np.concatenate([self._steps, np.full(START, STEP)])
+            steps = np.where(x[moved] + steps > self.high[moved], -steps, steps)
+            points = np.tile(x[[*moved, *added]], (1 + len(moved), 1))
+            points[1:, : len(moved)] += np.diag(steps)
+            rotations = self.rotations(index, points)
             residuals.append((rotations[0] - samples.rotations)[used] / deviation)
             block = np.zeros((np.count_nonzero(used), len(x)))
-            block[:, own] = (rotations[1:] - rotations[0])[:, used].T / steps / deviation
+            block[:, moved] = (rotations[1:] - rotations[0])[:, used].T / steps / deviation
+            shares = np.einsum('twk,wv->twvk', self._shares[index], np.eye(2)).reshape(*samples.rotations.shape, -1)
+            block[:, added] = shares[used] / deviation
             blocks.append(block)
-        zeros = [place for index in range(len(self.trials)) for place in self._own(index)[-2:]]
-        residuals.append(x[zeros] / ZERO)
-        blocks.append(np.eye(len(x))[zeros] / ZERO)
+        assumed = [place for index in range(len(self.trials)) for place in self._own(index)[START:]]
+        widths = np.tile([self._zero, *[REPEATED] * PARTS], 2 * len(self.trials))
+        residuals.append(x[assumed] / widths)
+        blocks.append(np.eye(len(x))[assumed] / widths[:, None])
         residuals.append(solve_triangular(self._root, x[:size] - self.known.coordinates, lower=True))
         before = np.zeros((size, len(x)))
         before[:, :size] = solve_triangular(self._root, np.eye(size), lower=True)
@@ -149,9 +164,9 @@ class Problem:
         return range(first, first + OWN)
 
     def own(self, trial: int, x: Floats) -> tuple[Floats, Floats]:
-        """Start and zeros of a trial, at a point or in its errors."""
-        numbers = x[self._own(trial)]
-        return numbers[:-2], numbers[-2:]
+        """Start and systematic errors of a trial, at a point or in its errors."""
+        start, systematic = np.split(x[self._own(trial)], [START])
+        return start, systematic.reshape(2, -1)
 
     def misfit(self, x: Floats) -> float:
         """The sum that a robust `solve` makes small."""
@@ -185,7 +200,7 @@ class Problem:
     def held(self, index: int, coordinate: float) -> tuple['Problem', float]:
         """The same with one unknown held, and what that adds to the squares."""
         known, square = self.known.held(index, coordinate)
-        return Problem(known, self.trials, self._deviations, self._used), square
+        return Problem(known, self.trials, self._deviations, self._used, self._zero), square
 
     def solve(self, x: Floats, robust: bool = True, settled: float = ROUGHLY, evaluations: int = EVALUATIONS) -> Floats:
         """The best point, from x on."""
@@ -249,7 +264,7 @@ class Fit(NamedTuple):
         return self.known._replace(coordinates=self.coordinates, covariance=self.covariance)
 
 
-def identify(known: Knowledge, trials: Sequence[Samples]) -> Fit:
+def identify(known: Knowledge, trials: Sequence[Samples], zero: float = ZERO) -> Fit:
     """The rig that explains trials best, beside what was known of it.
 
     From the first seconds on to the whole, so that a phase that drifts does not lead astray; outliers lose their weight
@@ -258,14 +273,15 @@ def identify(known: Knowledge, trials: Sequence[Samples]) -> Fit:
     Args:
         known: of the rig before.
         trials: at least one.
+        zero: to what the zeros of both wheels are known [rad].
 
     Raises:
         ValueError: the rig is impossible.
 
     """
     rough = [max(trial.noise(), COARSEST) for trial in trials]
-    owns = [np.append(trial.first_state(), [0.0, 0.0]) for trial in trials]
-    first = [Problem(known, [trial.until(window) for trial in trials], rough) for window in WINDOWS]
+    owns = [np.append(trial.first_state(), np.zeros(OWN - START)) for trial in trials]
+    first = [Problem(known, [trial.until(window) for trial in trials], rough, zero=zero) for window in WINDOWS]
     ends = []
     for inside in INSIDE:
         least = known.bounds()[0] + inside * np.sqrt(np.diag(known.covariance))
@@ -273,29 +289,40 @@ def identify(known: Knowledge, trials: Sequence[Samples]) -> Fit:
         for problem in first:
             x = problem.solve(x)
         ends.append(x)
-    whole = Problem(known, trials, rough)
-    x = whole.solve(min(ends, key=first[-1].misfit))
+    x, window = min(ends, key=first[-1].misfit), 2.0 * WINDOWS[-1]
+    while window < max(trial.seconds[-1] for trial in trials):
+        x = Problem(known, [trial.until(window) for trial in trials], rough, zero=zero).solve(x)
+        window *= 2.0
+    whole = Problem(known, trials, rough, zero=zero)
+    x = whole.solve(x)
     explained = _explained(whole, x)
     used = [~one.outliers for one in explained]
-    problem = Problem(known, trials, [one.deviation for one in explained], used)
+    problem = Problem(known, trials, [one.deviation for one in explained], used, zero)
     x = problem.released(problem.solve(x, robust=False, settled=SETTLED))
     explained = _explained(problem, x)
-    problem = Problem(known, trials, [one.deviation for one in explained], used)
+    problem = Problem(known, trials, [one.deviation for one in explained], used, zero)
     return Fit(problem, x, problem.covariance(x), tuple(explained))
 
 
 def _explained(problem: Problem, x: Floats) -> list[Explained]:
     size, found = len(problem.known.unknowns), []
     for index, samples in enumerate(problem.trials):
-        start, zeros = problem.own(index, x)
-        rotations = problem.rotations(index, np.concatenate([x[:size], start, zeros])[None])[0]
+        start, systematic = problem.own(index, x)
+        rotations = problem.rotations(index, np.concatenate([x[:size], start, systematic.ravel()])[None])[0]
         residuals = samples.rotations - rotations
         spread_of = max(float(np.median(np.abs(residuals))) / 0.6745, 1e-9)
         outliers = np.abs(residuals) > OUTLYING * spread_of
         noise = float(np.sqrt(np.mean(residuals[~outliers] ** 2)))
         memory = _memory(residuals, outliers)
-        found.append(Explained(samples, start, zeros, residuals, outliers, max(noise, 1e-9), memory))
+        found.append(Explained(samples, start, systematic, residuals, outliers, max(noise, 1e-9), memory))
     return found
+
+
+def _shares(samples: Samples, alphas: Floats) -> Floats:
+    """What systematic errors of 1 add to a trial's rotations, shape (T, 2, 1 + PARTS)."""
+    angles = (samples.rotations + alphas) / (2.0 * alphas)
+    part = (angles % 1.0 * PARTS).astype(int)
+    return np.concatenate([np.ones((*part.shape, 1)), part[..., None] == np.arange(PARTS)], axis=-1)
 
 
 def _memory(residuals: Floats, outliers: Mask) -> float:

@@ -137,7 +137,7 @@ class Assessment(NamedTuple):
     """Energy that the damper takes on the limit cycle [J/m]."""
     loads: Loads
     stall_slope: float
-    """As `stall_slope` [rad]."""
+    """As `stall_slopes` [rad]."""
     sensitivity: tuple[Variation, ...]
     margins: dict[str, Margin]
 
@@ -272,18 +272,24 @@ def bear(task: Task, k: Floats, b: Floats) -> list[Loads]:
     return borne
 
 
-def stall_slope(task: Task, k: float, b: float) -> float:
-    """The slope [rad] at and below which a coupler stalls: there it has no limit cycle, or no start leads to one.
+def stall_slopes(task: Task, k: Floats, b: Floats) -> Floats:
+    """The slopes [rad] at and below which couplers stall.
 
-    That of equal wheels is where the limit cycle ends; unequal ones are followed for as long as for margins. NaN where
-    it is gentler than 1/WIDEST of the rig's.
+    With equal wheels there is no limit cycle there. With unequal ones some start of the task does not walk on for as
+    long as margins are looked for, which takes some time for each. NaN where it is gentler than 1/WIDEST of the rig's.
+
+    Args:
+        task: rig and starts.
+        k: shape (N,) [N/m].
+        b: shape (N,) [N·s/m].
+
     """
-    rig = task.rig._replace(k=k, b=b)
-    if rig.front == rig.rear:
-        return float(gentlest_slopes(spread(rig, 1, {})).values[0])
+    if task.rig.front == task.rig.rear:
+        return gentlest_slopes(spread(task.rig, len(k), {'k': k, 'b': b})).values
     patient = task._replace(seconds=PATIENCE * task.seconds)
-    factor, verdict = _edge(patient, rig, 'slope', 1.0 / WIDEST, Verdict.ELSEWHERE)
-    return math.nan if verdict is None else factor * rig.slope
+    rigs = (task.rig._replace(k=float(one), b=float(other)) for one, other in zip(k, b, strict=True))
+    edges = (_edge(patient, rig, 'slope', 1.0 / WIDEST, Verdict.ELSEWHERE) for rig in rigs)
+    return np.array([math.nan if verdict is None else factor * task.rig.slope for factor, verdict in edges])
 
 
 def assess(task: Task, k: float, b: float, tolerance: float = PART_TOLERANCE) -> Assessment:
@@ -310,7 +316,7 @@ def assess(task: Task, k: float, b: float, tolerance: float = PART_TOLERANCE) ->
         float(walking.speed[0]),
         float(walking.damper[0]),
         bear(task, np.array([k]), np.array([b]))[0],
-        stall_slope(task, k, b),
+        float(stall_slopes(task, np.array([k]), np.array([b]))[0]),
         tuple(_sensitivity(task, rig, tolerance)),
         {name: _margin(task, rig, name) for name in VARIED},
     )

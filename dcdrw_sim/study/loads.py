@@ -13,6 +13,7 @@ from dcdrw_sim.model.dynamics import State, accelerations, coupler, coupler_forc
 from dcdrw_sim.model.rigs import Rigs, take
 from dcdrw_sim.model.wheel import inertia, kept
 from dcdrw_sim.motion.ensemble import Ensemble
+from dcdrw_sim.motion.runge_kutta import runge_kutta
 
 FINE = 16
 """Parts of the time between two strikes at which the coupler is looked at, at least."""
@@ -48,10 +49,43 @@ UNKNOWN = Loads(*(math.nan,) * len(Loads._fields))
 """Of a coupler that was not looked at."""
 
 
-def preload(rig: RigParams, k: float) -> float:
-    """The force of a spring where the pair is at 50 %, the hubs S0 + ℓ sin α apart [N], positive in tension."""
+SHORTEST, LONGEST = 0.5, 2.0
+"""Times its free length, a coil spring is worked between these: shorter, and coils touch; longer, and it yields."""
+
+
+class Order(NamedTuple):
+    """What spring to order, and how to mount it. Where the hubs are D0 apart it has no force."""
+
+    lengthened: float
+    """Most by which it is longer than its free length [m]; negative where it is always shorter."""
+    shortened: float
+    """Most by which it is shorter [m]."""
+    least_free_length: float
+    """That bears this, between SHORTEST and LONGEST [m]; without rods and eyes."""
+    free_length: float
+    """Of the spring that is ordered [m]: that on the list, else the least."""
+    rods: float
+    """What rods and eyes are to add to it, D0 less the free length [m]; negative where it is too long."""
+    preload: float
+    """Its force where the pair is at 50 %, the hubs S0 + ℓ sin α apart [N], positive in tension."""
+
+
+def order(rig: RigParams, k: float, loads: Loads, free_length: float = math.nan) -> Order:
+    """The spring of a coupler that bears these loads; NaN where they are unknown.
+
+    Args:
+        rig: in which it is.
+        k: its stiffness [N/m].
+        loads: of the coupler.
+        free_length: of the spring on the list [m]; NaN where none is told.
+
+    """
     rig = rig.resolved()
-    return k * (default_rest_length(math.nan, rig.S0, rig.front.length, rig.front.alpha) - rig.D0)
+    lengthened, shortened = loads.longest - rig.D0, rig.D0 - loads.shortest
+    least = max(shortened / (1.0 - SHORTEST), lengthened / (LONGEST - 1.0))
+    chosen = least if math.isnan(free_length) else free_length
+    half = default_rest_length(math.nan, rig.S0, rig.front.length, rig.front.alpha)
+    return Order(lengthened, shortened, least, chosen, rig.D0 - chosen, k * (half - rig.D0))
 
 
 def loads(rigs: Rigs, pairs: Rigs, motions: Ensemble, cycles: LimitCycles) -> list[Loads]:
@@ -93,7 +127,7 @@ def _bounds(rigs: Rigs, states: Floats, S: Floats, time: Floats) -> Floats:
     """The greatest |F|, |spring|, |damper|, −D, D and |Ḋ| of each motion between two strikes, shape (6, motions)."""
     rig = _each(rigs)
 
-    def rates(y: Floats) -> Floats:
+    def rates(_: Floats, y: Floats) -> Floats:
         state = State(*y)
         front, rear = accelerations(rig, state, S)
         return np.stack((state.omega1, front, state.omega2, rear))
@@ -107,8 +141,5 @@ def _bounds(rigs: Rigs, states: Floats, S: Floats, time: Floats) -> Floats:
         force, elastic = coupler_force(rig, spring.length, spring.rate), rigs.k * (spring.length - rigs.D0)
         now = abs(force), abs(elastic), abs(force - elastic), -spring.length, spring.length, abs(spring.rate)
         bounds = np.maximum(bounds, np.array(now, float))
-        k1 = rates(y)  # Runge and Kutta's classic method: the strikes are known, so that nothing else is needed
-        k2 = rates(y + 0.5 * h * k1)
-        k3 = rates(y + 0.5 * h * k2)
-        y = y + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + rates(y + h * k3))
+        y = runge_kutta(rates, y, h)
     return bounds

@@ -7,11 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dcdrw_sim.study.design import Report, Task, bear, score, worst_cases
-from dcdrw_sim.study.loads import UNKNOWN, Loads
+from dcdrw_sim.study.design import Report, Task, bear, score, stall_slopes, worst_cases
+from dcdrw_sim.study.loads import UNKNOWN, Loads, Order, order
 from dcdrw_sim.study.verdict import Verdict
 
 SPRING, DASHPOT = 'spring', 'dashpot'
+LOOKED_AT = 12
+"""Of unequal wheels the slopes are sought on which so many pairs stall, the best."""
 
 
 class Part(NamedTuple):
@@ -28,6 +30,8 @@ class Part(NamedTuple):
     """That it is rated for [m]: a spring's change of length from its free length, a dashpot's travel."""
     max_speed: float = math.inf
     """That it is rated for [m/s]."""
+    free_length: float = math.nan
+    """A spring's, without force and without rods [m]; NaN where it is not told."""
 
     def exceeded(self, force: float, stroke: float, speed: float) -> list[str]:
         """The rated limits that these loads exceed, by their names."""
@@ -54,6 +58,10 @@ class Pair(NamedTuple):
     """NaN where it does not come into step."""
     exceeded: tuple[str, ...]
     """Rated limits that do not allow it."""
+    order: Order
+    """Of the spring."""
+    stall_slope: float = math.nan
+    """As `dcdrw_sim.study.design.stall_slopes` [rad]; NaN also where it was not looked at."""
 
     @property
     def works(self) -> bool:
@@ -93,5 +101,16 @@ def rank(task: Task, parts: Iterable[Part], tolerance: float, report: Report = l
         ]
         verdict = Verdict(int(scores.verdict[index]))
         steps, time, if_off = (float(column[index]) for column in (scores.steps, scores.time, off.steps))
-        pairs.append(Pair(spring, dashpot, verdict, steps, time, if_off, int(ranks[index]), loads, tuple(exceeded)))
-    return sorted(pairs, key=lambda pair: not pair.works)
+        ordered = order(task.rig, spring.value, loads, spring.free_length)
+        if ordered.rods < 0.0:
+            exceeded.append('spring free_length')
+        rank_if_off = int(ranks[index])
+        pairs.append(Pair(spring, dashpot, verdict, steps, time, if_off, rank_if_off, loads, tuple(exceeded), ordered))
+    pairs.sort(key=lambda pair: not pair.works)
+    equal = task.rig.front == task.rig.rear
+    seen = [pair for pair in pairs if pair.works][: None if equal else LOOKED_AT]
+    values = np.array([(pair.spring.value, pair.dashpot.value) for pair in seen]).reshape(-1, 2)
+    slopes = stall_slopes(task, *values.T) if seen else np.empty(0)
+    return [pair._replace(stall_slope=float(slope)) for pair, slope in zip(seen, slopes, strict=True)] + pairs[
+        len(seen) :
+    ]

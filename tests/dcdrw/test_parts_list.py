@@ -59,11 +59,17 @@ def test_a_column_that_nobody_reads_is_told(read):
     assert read('kind,value,peak force\nspring,10,4\ndamper,9,5\n').skipped == ("column 'peak force': not known",)
 
 
+def test_free_lengths_are_read(read):
+    spring, other, _ = read('kind,value,free length [mm]\nspring,10,300\nspring,12,\ndamper,9,\n').parts
+    assert spring.free_length == pytest.approx(0.3)
+    assert math.isnan(other.free_length)
+
+
 def test_rated_limits_are_read_in_their_units(read):
     offer = read('kind,value,name,max_force [N],Max Stroke (mm),max_speed\nspring,10,,5,200,\ndamper,9,x,,0.3 m,0.5\n')
     spring, dashpot = offer.parts
-    assert spring[3:] == (5.0, pytest.approx(0.2), math.inf)
-    assert dashpot[3:] == (math.inf, pytest.approx(0.3), 0.5)
+    assert spring[3:6] == (5.0, pytest.approx(0.2), math.inf)
+    assert dashpot[3:6] == (math.inf, pytest.approx(0.3), 0.5)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 
 import pytest
 
@@ -36,11 +37,16 @@ def test_best_pair_of_parts_with_card_and_numbers(tmp_path, parts, capsys):
     assert found['couplers']['given']['multiplier'] == pytest.approx(0.9411, abs=1e-4)
     assert found['task']['band_percent'] == pytest.approx(6.0)
     assert found['couplers']['given']['loads']['force'] == pytest.approx(23.9, abs=0.1)
-    assert found['couplers']['given']['spring_free_length'] == pytest.approx(1.2150, abs=1e-4)
+    given = found['couplers']['given']
+    assert given['hub_distance_at_rest'] == pytest.approx(1.2150, abs=1e-4)
+    assert given['spring_free_length'] + given['spring_rods'] == pytest.approx(1.2150, abs=1e-4)
+    assert f'free length {1e3 * given["spring_free_length"]:.0f} mm or more' in output
+    assert f'{1e3 * given["spring_rods"]:.0f} mm of rods and eyes; without force' in output
     with (tmp_path / 'out' / 'pairs.csv').open(encoding='utf-8') as file:
         rows = list(csv.DictReader(file))
     assert [row['spring'] for row in rows] == [pair['spring'] for pair in found['pairs']]
     assert (rows[0]['spring'], rows[0]['dashpot']) == ('firm', 'thin')
+    assert float(rows[0]['stall_slope']) == pytest.approx(found['couplers']['fastest']['stall_slope'])
     assert "skipped, line 6: kind must be spring, dashpot or damper, got 'rope'" in output
     assert found['skipped']
     assert (tmp_path / 'out' / 'card.pdf').read_bytes().startswith(b'%PDF')
@@ -73,6 +79,33 @@ def test_what_swings_beyond_the_band_is_not_recommended_and_what_is_the_monitor_
     assert (max(fastest['steps']), max(fastest['strike_steps'])) == (6, 3)
     assert not other['recommended']
     assert (other['worst_steps'], max(other['strike_steps'])) == (None, 2)
+
+
+KNOWN = """\
+/**:
+  ros__parameters: {slope: 0.0349065850}
+uncertainty:
+  ros__parameters:
+    standard_errors: {slope: 0.008, mass: 1.0, k: 0.0}
+"""
+
+
+def test_a_rig_that_is_known_with_errors_gets_the_coupler_that_is_surest_on_what_it_may_be(tmp_path, parts, capsys):
+    (tmp_path / 'rig.yaml').write_text(KNOWN)
+    arguments = ['--rig', tmp_path / 'rig.yaml', '--available', parts, '--seconds', 30, '--out', tmp_path / 'out']
+    assert main(['design', *map(str, arguments), '--format', 'png']) == 0
+    output = capsys.readouterr().out
+    couplers = json.loads((tmp_path / 'out' / 'design.json').read_text())['couplers']
+    outlooks = {name: coupler['outlook'] for name, coupler in couplers.items()}
+    assert set(outlooks) == {'fastest', 'most_forgiving', 'surest'}
+    best = outlooks['surest']
+    assert best['rigs'] == 64
+    assert max(one['in_step'] for one in outlooks.values()) == best['in_step'] < 1.0  # on some slopes none rolls
+    assert best['median_steps'] <= (best['late_steps'] or math.inf)
+    told = output.partition('On 64 rigs as likely as this one is known:')[2]
+    assert f'surest         in step from every start on {100.0 * best["in_step"]:.0f} %' in told
+    assert f'half of them within {best["median_steps"]:.0f} steps' in told
+    assert (tmp_path / 'out' / 'card.png').exists()
 
 
 @pytest.mark.parametrize(

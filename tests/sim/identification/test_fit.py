@@ -131,6 +131,23 @@ def test_forces_are_told_in_proportion_to_k():
     assert sample_pairs(spread(rig, 1, double | masses), np.array([state]), times) == pytest.approx(one, abs=1e-9)
 
 
+def test_a_long_trial_on_a_slope_on_which_the_pair_hardly_rolls_is_followed():
+    rig = TRUE._replace(slope=math.radians(1.35))
+    found = identify(knowledge(SAID._replace(slope=rig.slope), FIXED), [free_rolling(SAID, *trial(rig, seconds=60.0))])
+    assert found.trials[0].noise == pytest.approx(NOISE, rel=0.1)
+    assert np.abs(deviations(found, rig)).max() < 3.5
+
+
+def test_zeros_that_are_known_badly_are_found():
+    times, psi = trial()
+    psi[:, 0] += math.radians(0.5)
+    found = identify(knowledge(SAID, FIXED), [free_rolling(SAID, times, psi)], zero=math.radians(0.5))
+    assert np.abs(deviations(found)).max() < 3.0
+    index = len(found.known.unknowns) + 4
+    error = math.sqrt(found.whole_covariance[index, index])
+    assert found.trials[0].systematic[0, 0] == pytest.approx(math.radians(0.5), abs=3.0 * error)
+
+
 def test_profiles_are_parabolas_where_errors_are_even(fit):
     found = {profile.name: profile for profile in profiles(fit)}
     error = math.sqrt(fit.covariance[0, 0])

@@ -7,9 +7,10 @@ import pytest
 
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.start import start
+from dcdrw_sim.motion.ends import End
 from dcdrw_sim.motion.trajectory import run
-from dcdrw_sim.study.design import Task, bear, stall_slope
-from dcdrw_sim.study.loads import preload
+from dcdrw_sim.study.design import Task, bear, stall_slopes
+from dcdrw_sim.study.loads import UNKNOWN, order
 from dcdrw_sim.study.parts import Part, rank
 
 RIG = preset('paper').resolved()
@@ -46,12 +47,34 @@ def test_heat_is_what_the_slope_gives_and_strikes_leave():
 
 
 def test_a_spring_at_rest_at_half_a_step_has_no_preload_and_a_shorter_one_pulls():
-    assert preload(RIG, 5.25) == pytest.approx(0.0, abs=1e-12)
-    assert preload(RIG._replace(D0=RIG.D0 - 0.1), 5.25) == pytest.approx(0.525)
+    assert order(RIG, 5.25, UNKNOWN).preload == pytest.approx(0.0, abs=1e-12)
+    assert order(RIG._replace(D0=RIG.D0 - 0.1), 5.25, UNKNOWN).preload == pytest.approx(0.525)
+
+
+def test_a_spring_is_neither_squeezed_to_half_its_free_length_nor_drawn_to_twice_it():
+    loads = UNKNOWN._replace(shortest=RIG.D0 - 0.2, longest=RIG.D0 + 0.3)
+    ordered = order(RIG, 5.25, loads)
+    assert (ordered.shortened, ordered.lengthened) == pytest.approx((0.2, 0.3))
+    assert (ordered.free_length, ordered.rods) == pytest.approx((0.4, RIG.D0 - 0.4))
+    assert order(RIG, 5.25, loads._replace(longest=RIG.D0 + 0.5)).free_length == pytest.approx(0.5)
+    own = order(RIG, 5.25, loads, 0.3)
+    assert (own.free_length, own.least_free_length, own.rods) == pytest.approx((0.3, 0.4, RIG.D0 - 0.3))
 
 
 def test_the_papers_coupler_stalls_where_its_limit_cycle_ends():
-    assert 1.4485 < math.degrees(stall_slope(TASK, 5.25, 100.0)) < 1.4495
+    assert 1.4485 < math.degrees(stall_slopes(TASK, np.array([5.25]), np.array([100.0]))[0]) < 1.4495
+
+
+def test_unequal_wheels_stall_where_simulation_lets_some_start_stand():
+    rig = RIG._replace(rear=RIG.rear._replace(length=0.95, mass=12.0), k=5.25, b=100.0)
+    task = Task(rig, 60.0, phases=(0.1, 0.9))
+    [slope] = stall_slopes(task, np.array([5.25]), np.array([100.0]))
+    gentler, steeper = (
+        [run(*start(rig._replace(slope=factor * slope), phase), 240.0).end for phase in task.phases]
+        for factor in (0.995, 1.003)
+    )
+    assert End.STANDING in gentler
+    assert steeper == [End.TIME, End.TIME]
 
 
 def test_rated_limits_rule_out_what_asks_for_more():

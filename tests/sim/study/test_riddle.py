@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from dcdrw_sim.study.riddle import SPANS, causes, course, rows
+from dcdrw_sim.study.riddle import SPANS, Cause, causes, course, course_of, rows
 from tests import ROOT
 
 
 @pytest.fixture(scope='module')
 def courses():
-    return {cause.name: course(cause.rig) for cause in causes()}
+    return {cause.name: course_of(cause) for cause in causes()}
 
 
 def test_the_model_as_the_paper_states_it_takes_38_steps(courses):
@@ -39,6 +39,20 @@ def test_neither_mass_nor_what_the_paper_leaves_out_of_a_wheel_explains_seven_st
     for found in slow:
         assert not found.stays(SPANS[0])
         assert (np.abs(found.strikes[:10]) > 6.0).all()
+
+
+def test_a_one_way_damper_drives_the_pair_through_50_percent_or_away_from_it(courses):
+    resists = {way: courses[f'a damper that only resists {way}'].strikes for way in ('lengthening', 'shortening')}
+    assert (resists['lengthening'][:10] < -30.0).all()
+    assert (resists['shortening'][3:10] > 40.0).all()
+
+
+@pytest.mark.parametrize('way', [1, -1])
+def test_a_one_way_damper_that_does_nothing_leaves_the_motion_of_the_pair(way):
+    rig = next(causes()).rig._replace(k=40.0, b=0.0)
+    one_way, plain = course_of(Cause('', rig, '', way)), course(rig)
+    assert one_way.strike_times == pytest.approx(plain.strike_times, abs=1e-4)
+    assert one_way.error == pytest.approx(plain.error, abs=0.01)
 
 
 def test_from_the_other_side_a_preload_drives_the_pair_away():
