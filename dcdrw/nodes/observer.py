@@ -13,7 +13,7 @@ from dcdrw_msgs_py.messages import PhaseSampleReader, diagnoses, footfall
 from dcdrw_msgs_py.node import Age, advertise, listen, steady_clock
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import PhaseSample
-from dcdrw_msgs_py.topics import DIAGNOSTICS, ENABLE, FOOTFALLS, PERSON_FORCE, PHASE_STATE, SYNC_ERROR
+from dcdrw_msgs_py.topics import DIAGNOSTICS, ENABLE, FOOTFALLS, PHASE_STATE, SYNC_ERROR
 from dcdrw_tracker.gait.rest import moves
 from dcdrw_tracker.gait.sync import SyncMonitor, SyncParams
 
@@ -35,8 +35,6 @@ class Observer(Node):
         """The wheels have been let go."""
         self.diagnoses: dict[str, Diagnosis] = {}
         """What each node said of itself last."""
-        self.person_forces: list[float] = []
-        """The coupler's force on the person since the wheels were let go, where one walks in front [N]."""
         self.age = Age()
         self._first: PhaseSample | None = None
         self._last: PhaseSample | None = None
@@ -47,7 +45,6 @@ class Observer(Node):
             (FOOTFALLS[FRONT], lambda message: self._on_footfall(message, FRONT)),
             (FOOTFALLS[REAR], lambda message: self._on_footfall(message, REAR)),
             (DIAGNOSTICS, self._on_diagnostics),
-            (PERSON_FORCE, self._on_person_force),
         ):
             listen(self, topic, self._bearing(topic.name, callback))
 
@@ -92,10 +89,6 @@ class Observer(Node):
     def _on_footfall(self, message: Any, wheel: str) -> None:
         if self.moving:
             self.strikes[footfall(message, wheel).wheel] += 1
-
-    def _on_person_force(self, message: Any) -> None:
-        if self.moving:
-            self.person_forces.append(message.wrench.force.x)
 
     def enable_when_moving(self) -> None:
         """Enable the synchronizer from when the wheels have been let go, by a heartbeat."""

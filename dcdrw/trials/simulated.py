@@ -8,6 +8,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from dcdrw.console import in_words, interruptible
 from dcdrw.recordings.bag_folder import RECORDING
 from dcdrw.recordings.recording import Recording
@@ -26,12 +28,13 @@ from dcdrw.suite.recorder_params import RecorderParams
 from dcdrw.trials.agreement import Agreement
 from dcdrw.trials.analysis import Analysis, analyze
 from dcdrw.trials.filmed_rig import FilmedRig, TruthError, truth_error
-from dcdrw.trials.motion import Whole
+from dcdrw.trials.motion import MotionTable, Sink, Whole
 from dcdrw.trials.results import read_trial, sample_file
 from dcdrw_control.sync.synchronizer import SynchronizerParams
 from dcdrw_msgs_py.diagnosis import Diagnosis, RecorderState, messages_of, parameters_of
 from dcdrw_msgs_py.rig import REAR
-from dcdrw_msgs_py.topics import FOOTFALLS, JOINT_STATES, PHASE_STATE, SYNC_ERROR
+from dcdrw_msgs_py.topics import COUPLER, FOOTFALLS, JOINT_STATES, PHASE_STATE, SYNC_ERROR
+from dcdrw_msgs_py.values import Floats
 
 if TYPE_CHECKING:
     from dcdrw.nodes.observer import Observer
@@ -60,6 +63,32 @@ class PersonForce(NamedTuple):
     def __str__(self) -> str:
         """The force in a sentence."""
         return f'On the person: {self.peak:.1f} N at most, {self.rms:.1f} N rms.'
+
+
+class ForceMeter:
+    """Takes the coupler's force from what was recorded: a `Sink`."""
+
+    def __init__(self) -> None:
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget what came before."""
+        self._count, self._peak, self._squares = 0, 0.0, 0.0
+
+    def take(self, motion: MotionTable) -> None:
+        """Take the next rows."""
+        self.add(motion.coupler_force)
+
+    def add(self, forces: Floats) -> None:
+        """Take the next forces [N]; NaN where one is unknown."""
+        known = forces[np.isfinite(forces)]
+        self._count += known.size
+        self._peak = max(self._peak, float(np.abs(known).max(initial=0.0)))
+        self._squares += float(known @ known)
+
+    def told(self) -> PersonForce | None:
+        """Peak and rms; None where no force is known."""
+        return PersonForce(self._peak, math.sqrt(self._squares / self._count)) if self._count else None
 
 
 class Course(NamedTuple):
@@ -243,22 +272,18 @@ class SimulatedTrial:
         """Judge what there is, whatever happened."""
         truth: TruthError | None = None
         agreements: dict[str, Agreement] = {}
-        analysis, whole = analyze([], self._params), Whole()
-        sinks = (whole,) if self._filmed else ()
+        analysis, whole, force = analyze([], self._params), Whole(), ForceMeter()
+        sinks: tuple[Sink, ...] = (whole,) if self._filmed else (force,)
         try:
             with sample_file(self._folder) as table:
                 analysis, agreements = read_trial(self._folder / RECORDING, self._params, sinks=(table, *sinks))
                 if self._filmed:
                     with Recording(self._folder / RECORDING) as recording:
-                        truth = truth_error(whole.motion, self._params, recording.joints(recording.find(TRUTH)))
+                        true = recording.find(TRUTH)
+                        truth = truth_error(whole.motion, self._params, recording.joints(true))
+                        for batch in recording.joints(true):
+                            force.add(batch.effort[batch.stamp_ns >= analysis.start_ns, batch.names.index(COUPLER)])
         except (ValueError, OSError) as error:
             failure = failure or in_words(error)
-        return Course(
-            failure, self._interrupted, analysis, agreements, truth, self._observer.diagnoses, self._force_on_person()
-        )
-
-    def _force_on_person(self) -> PersonForce | None:
-        forces = self._observer.person_forces
-        if not forces:
-            return None
-        return PersonForce(max(map(abs, forces)), math.sqrt(sum(force**2 for force in forces) / len(forces)))
+        on_person = force.told() if self._params.simulator.person.walks else None
+        return Course(failure, self._interrupted, analysis, agreements, truth, self._observer.diagnoses, on_person)

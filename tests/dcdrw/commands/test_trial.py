@@ -11,6 +11,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from dcdrw.cli import main
@@ -106,6 +107,7 @@ def test_a_person_s_trial_is_run_closed_loop_and_tells_the_force_on_the_person(t
         recorded = [SYNCHRONIZER_STATE, REAR_TORQUE_COMMAND, COUPLER_WRENCH, PERSON_FORCE, ENABLE]
         assert all(recording.count(f'/{topic.name}') for topic in recorded)
     trial, _ = read_trial(tmp_path / 'out')
+    assert force['peak'] == np.abs(trial.motion.coupler_force).max(), 'as the picture says'
     (begins, _), *_ = [act for act in trial.acts if act[1] == 'active']
     assert -1.0 < (begins - trial.start_ns) / 1e9 < 5.0  # it is enabled when the wheels have been let go
     panels = [axes.get_ylabel() for axes in trial_figure(trial, '').axes]
