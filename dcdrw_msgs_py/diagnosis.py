@@ -145,3 +145,16 @@ def value_text(value: Value) -> str:
     if isinstance(value, float):
         return f'{value:.6g}' if math.isfinite(value) else 'nan'
     return str(value)
+
+
+NOTICEABLE = 0.05
+"""So large a share of a second's samples that are missing is a warning."""
+
+
+def lost_since(diagnosis: Diagnosis, before: float) -> Diagnosis:
+    """The same with a warning where many samples have been lost since there were so many, a second ago."""
+    lost, rate = (diagnosis.values.get(key, 0.0) for key in (LOST_SAMPLES, RATE_IN))
+    if not (isinstance(lost, (int, float)) and isinstance(rate, (int, float)) and lost - before > NOTICEABLE * rate):
+        return diagnosis
+    message = f'{lost - before:g} samples were lost within a second; {diagnosis.message}'
+    return diagnosis._replace(level=max(diagnosis.level, Level.WARN), message=message)

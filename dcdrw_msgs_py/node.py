@@ -25,7 +25,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
-from dcdrw_msgs_py.diagnosis import Diagnosis, Level
+from dcdrw_msgs_py.diagnosis import LOST_SAMPLES, Diagnosis, Level, lost_since
 from dcdrw_msgs_py.executor import StreamExecutor
 from dcdrw_msgs_py.messages import diagnostics_message, stamp_ns
 from dcdrw_msgs_py.quantity import Field, build, fields, flatten
@@ -343,9 +343,13 @@ def publish_diagnosis(node: Node, diagnose: Callable[[], Diagnosis]) -> Callable
     """
     publisher = advertise(node, DIAGNOSTICS)
     told: dict[str, int] = {}
+    missing: Any = 0
 
     def publish() -> None:
+        nonlocal missing
         diagnosis, lost = diagnose(), dropped(node)
+        before, missing = missing, diagnosis.values.get(LOST_SAMPLES, 0)
+        diagnosis = lost_since(diagnosis, before)
         values = {**diagnosis.values, **{f'messages dropped of {topic}': count for topic, count in lost.items()}}
         level, message = diagnosis.level, diagnosis.message
         if lost != told:
