@@ -40,7 +40,7 @@ from dcdrw_sim.study.design import (
     score,
     search,
 )
-from dcdrw_sim.study.loads import Order, order
+from dcdrw_sim.study.loads import Order, half_step_distance, order
 from dcdrw_sim.study.outlook import CANDIDATES, DRAWN, FINAL, Outlook, outlook, surest
 from dcdrw_sim.study.parts import DASHPOT, SPRING, Pair, Part, rank
 from dcdrw_sim.study.sweep import default_seconds
@@ -54,8 +54,8 @@ NEAR = 0.2
 """A slope that is gentler than the rig's by less than this part is near: a level, or a floor, may be off by so much."""
 SLOPE_SHOWN = math.radians(0.05)
 """Two slopes nearer than this are told as one."""
-LEAST_PRELOAD = 0.05
-"""Of a spring [N]: less is none."""
+LEAST_PRELOAD = 0.005
+"""Of a spring, as a length [m]: less is none."""
 SEED = 1
 """Of the rigs that are drawn: the same every time."""
 AFTERWARDS = 30.0
@@ -183,6 +183,7 @@ def run(options: argparse.Namespace) -> int:
         found['couplers'][name.replace(' ', '_')]['outlook'] = one._asdict()
     lines = chain(
         summary_lines(task, chosen, seen, parts, tolerance),
+        _hint(task, chosen, seen),
         _outlook_lines(outlooks),
         _offer_lines(ranked, offer, len(task.phases)),
     )
@@ -192,7 +193,7 @@ def run(options: argparse.Namespace) -> int:
         write_text(options.out / 'design.json', to_json(found), options.force)
         for path in tables:
             write_csv(path, COLUMNS, map(dict.values, pair_records(ranked)), options.force)
-        texts = _texts(task, chosen, parts, tolerance)
+        texts = _texts(task, chosen, parts, tolerance, outlooks)
         on_sale = {kind: [part.value for part in parts if part.kind == kind] for kind in (SPRING, DASHPOT)}
         large = {name: _sentence(warnings(task, found)) for name, found in chosen.items()}
         with for_print():
@@ -254,9 +255,26 @@ def _outlook_lines(outlooks: dict[str, Outlook]) -> Iterator[str]:
         yield ''
         yield f'On {FINAL} rigs as likely as this one is known:'
     for name, one in outlooks.items():
-        late = '' if math.isnan(one.late_steps) else f'; nine of ten within {one.late_steps:.0f} steps'
-        half = '' if math.isnan(one.median_steps) else f', half of them within {one.median_steps:.0f} steps'
-        yield f'  {name:<14} in step from every start on {100.0 * one.in_step:.0f} %{half}{late}'
+        yield f'  {name:<14} {_likely(one)}'
+
+
+def _likely(one: Outlook) -> str:
+    late = '' if math.isnan(one.late_steps) else f'; nine of ten within {one.late_steps:.0f} steps'
+    half = '' if math.isnan(one.median_steps) else f', half of them within {one.median_steps:.0f} steps'
+    return f'in step from every start on {100.0 * one.in_step:.0f} %{half}{late}'
+
+
+def _hint(task: Task, chosen: dict[str, Assessment], seen: dict[str, Steps]) -> Iterator[str]:
+    """Where no coupler is recommended, and the spring's mounting may be why."""
+    rig = task.rig.resolved()
+    off = rig.D0 - half_step_distance(rig)
+    if abs(off) > LEAST_PRELOAD and not any(recommended(found, seen[name]) for name, found in chosen.items()):
+        yield ''
+        yield (
+            f'No coupler is recommended for a spring that is without force at D0 = {rig.D0:.3f} m. With '
+            f'{1e3 * abs(off):.0f} mm {"less" if off > 0.0 else "more"} of rods it is so at 50 %: try it, as '
+            f'D0: {rig.D0 - off:.3f} in the rig file.'
+        )
 
 
 def _offer_lines(ranked: list[Pair], offer: PartsList, starts: int) -> Iterator[str]:
@@ -343,7 +361,7 @@ def _bought(task: Task, found: Assessment, parts: Sequence[Part]) -> Iterator[tu
             f'{loads.speed:.2f} m/s in the damper'
             + ('' if math.isnan(loads.heat) else f', {loads.heat:.0f} J of heat a minute'),
         )
-    ordered = _order(task, found, parts)
+    ordered, half = _order(task, found, parts), half_step_distance(rig)
     if not math.isnan(ordered.free_length):
         more, least = '', ordered.least_free_length
         if ordered.free_length == least:
@@ -361,8 +379,9 @@ def _bought(task: Task, found: Assessment, parts: Sequence[Part]) -> Iterator[tu
         f'{rods}without force where the hubs are D0 = {rig.D0:.3f} m apart, '
         + (
             'as at 50 %: no preload'
-            if abs(ordered.preload) < LEAST_PRELOAD
-            else f'and it {"pulls" if ordered.preload > 0.0 else "pushes"} with {abs(ordered.preload):.1f} N at 50 %'
+            if abs(half - rig.D0) < LEAST_PRELOAD
+            else f'and it {"pulls" if half > rig.D0 else "pushes"} with {abs(ordered.preload):.2g} N at 50 %, '
+            f'where they are {half:.3f} m apart'
         ),
     )
 
@@ -392,7 +411,13 @@ def _sentence(parts: Iterator[str]) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _texts(task: Task, chosen: dict[str, Assessment], parts: Sequence[Part], tolerance: float) -> dict[str, str]:
+def _texts(
+    task: Task,
+    chosen: dict[str, Assessment],
+    parts: Sequence[Part],
+    tolerance: float,
+    outlooks: dict[str, Outlook],
+) -> dict[str, str]:
     """The card's words."""
     return {
         name: '\n'.join(
@@ -403,6 +428,7 @@ def _texts(task: Task, chosen: dict[str, Assessment], parts: Sequence[Part], tol
                     for heading, content in told(task, found, parts, tolerance)
                     if heading != 'from each'
                 ),
+                *([f'of {FINAL} rigs as likely: {_likely(outlooks[name])}'] if outlooks else []),
             ]
         )
         for name, found in chosen.items()
@@ -481,7 +507,7 @@ def json_record(
 def _rig_line(task: Task) -> str:
     rig = task.rig
     same = rig.front == rig.rear
-    wheels = [f'{wheel.length:g} m, {wheel.mass:g} kg, {wheel.spokes:g} spokes' for wheel in (rig.front, rig.rear)]
+    wheels = [f'{wheel.length:.4g} m, {wheel.mass:.4g} kg, {wheel.spokes:g} spokes' for wheel in (rig.front, rig.rear)]
     return (
         f'Two wheels of {wheels[0]}' if same else f'A front wheel of {wheels[0]}, a rear one of {wheels[1]}'
     ) + f', on {math.degrees(rig.slope):.3g}°.'

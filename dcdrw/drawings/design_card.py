@@ -12,11 +12,13 @@ from dcdrw_sim.study.design import GRID, Assessment, Scores, Task
 from dcdrw_sim.study.verdict import Verdict
 
 A4 = 8.27, 11.69
-"""[inch]"""
+"""[inch]; what needs more is on a longer page."""
+TOP, PLOTS = 0.7, 5.2
+"""Heights of the title, and of the plots at least [inch]."""
 COLOURS = VERMILION, BLUE, PINK, ORANGE
 """Colours of the couplers, in their order."""
 MARKERS = '*', 'o', 'D', 's'
-LETTERS = 120
+LETTERS = 130
 """Of a line."""
 LINE = 0.138
 """Height of a line of POINTS [inch]."""
@@ -50,13 +52,14 @@ def draw_card(
         ValueError: matplotlib is not installed.
 
     """
-    figure = new_figure(*A4, 'a card')
     boxes = [
         _Box(large[name], _wrapped(text), colour) for (name, text), colour in zip(lines.items(), COLOURS, strict=False)
     ]
-    below = _write(figure, title, boxes)
+    height = max(A4[1], TOP + LINE * sum(box.lines for box in boxes) + PLOTS)
+    figure = new_figure(A4[0], height, 'a card')
+    below = _write(figure, height, title, boxes)
     figure.get_layout_engine().set(w_pad=0.15, h_pad=0.12, rect=(0.03, 0.02, 0.94, below - 0.03))
-    top, middle, bottom = figure.subplots(3, 1, height_ratios=(3.0, 2.1, 1.6))
+    top, middle, bottom = figure.subplots(3, 1, height_ratios=(2.6, 1.8, 1.8))
     _draw_map(top, grid, chosen, on_sale)
     _draw_paths(middle, task, chosen)
     _draw_sensitivity(bottom, chosen)
@@ -80,10 +83,10 @@ def _wrapped(text: str) -> str:
     return '\n'.join(fill(line, LETTERS, subsequent_indent='    ') for line in text.split('\n'))
 
 
-def _write(figure: Any, title: str, boxes: list[_Box]) -> float:
+def _write(figure: Any, height: float, title: str, boxes: list[_Box]) -> float:
     """Write the words; returns where they end, as a part of the page."""
-    line, place = LINE / A4[1], 0.94
-    figure.text(0.5, 0.965, title, ha='center', fontsize=13, fontweight='bold')
+    line, place = LINE / height, 1.0 - TOP / height
+    figure.text(0.5, 1.0 - 0.6 * TOP / height, title, ha='center', fontsize=13, fontweight='bold')
     for box in boxes:
         figure.text(0.06, place, box.large, va='top', fontsize=LARGE_POINTS, fontweight='bold', color=VERMILION)
         below = place - (LARGE * line if box.large else 0.0)
@@ -189,6 +192,6 @@ def _draw_sensitivity(axes: Any, chosen: dict[str, Assessment]) -> None:
         for variation in next(iter(chosen.values())).sensitivity
     ]
     axes.set_xticks(range(len(labels)), labels)
-    axes.set(ylabel='steps, worst start', ylim=(0, 1.1 * highest))
+    axes.set(ylabel='steps, worst start', xlim=(-0.5, len(labels) - 0.5), ylim=(0, 1.1 * highest))
     axes.locator_params(axis='y', integer=True)
     axes.set_title('what if one is off', loc='left')

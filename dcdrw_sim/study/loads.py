@@ -67,7 +67,7 @@ class Order(NamedTuple):
     rods: float
     """What rods and eyes are to add to it, D0 less the free length [m]; negative where it is too long."""
     preload: float
-    """Its force where the pair is at 50 %, the hubs S0 + ℓ sin α apart [N], positive in tension."""
+    """Its force where the pair is at 50 % [N], positive in tension."""
 
 
 def order(rig: RigParams, k: float, loads: Loads, free_length: float = math.nan) -> Order:
@@ -84,8 +84,13 @@ def order(rig: RigParams, k: float, loads: Loads, free_length: float = math.nan)
     lengthened, shortened = loads.longest - rig.D0, rig.D0 - loads.shortest
     least = max(shortened / (1.0 - SHORTEST), lengthened / (LONGEST - 1.0))
     chosen = least if math.isnan(free_length) else free_length
-    half = default_rest_length(math.nan, rig.S0, rig.front.length, rig.front.alpha)
-    return Order(lengthened, shortened, least, chosen, rig.D0 - chosen, k * (half - rig.D0))
+    return Order(lengthened, shortened, least, chosen, rig.D0 - chosen, k * (half_step_distance(rig) - rig.D0))
+
+
+def half_step_distance(rig: RigParams) -> float:
+    """How far the hubs are apart where the pair is at 50 %, S0 + ℓ sin α [m]."""
+    rig = rig.resolved()
+    return default_rest_length(math.nan, rig.S0, rig.front.length, rig.front.alpha)
 
 
 def loads(rigs: Rigs, pairs: Rigs, motions: Ensemble, cycles: LimitCycles) -> list[Loads]:

@@ -28,7 +28,7 @@ def assessment(steps):
     )
 
 
-@pytest.mark.parametrize('names', [['fastest', 'most forgiving'], ['fastest', 'most forgiving', 'given']])
+@pytest.mark.parametrize('names', [['fastest', 'most forgiving'], ['fastest', 'most forgiving', 'surest', 'given']])
 @pytest.mark.parametrize('steps', [5.0, 300.0, NAN], ids=['quick', 'slow', 'stalls'])
 def test_no_text_covers_another(names, steps):
     k, b = mesh((0.01, 100.0), (0.3, 3000.0))
