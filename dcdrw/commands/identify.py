@@ -15,7 +15,7 @@ from dcdrw.files import add_force, refuse_existing, to_json, write_text, write_w
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file, read_uncertainty, write_changed
 from dcdrw.trials.motion import Whole
 from dcdrw.trials.results import read_trial
-from dcdrw.trials.rolling import rolling_samples
+from dcdrw.trials.rolling import rolling_samples, table_samples
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.topics import JOINT_STATES
@@ -45,10 +45,12 @@ SLOW = 5.0
 MOST_GAINS = 3
 """Measurements that are told."""
 _EPILOG = """\
-A recording is as for dcdrw analyze, or the folder of dcdrw track. The rig file says what is known: its values are where
-the search begins, and how far each is trusted stands in its section on uncertainty (docs/identify.md), or is assumed.
-The spring's rate is as the file says: free wheels tell masses, damping and friction only in proportion to it. Several
-recordings must be of the same rig.
+A recording is as for dcdrw analyze, or the folder of dcdrw track, or a CSV file of encoders: columns time [s], psi1 and
+psi2 [rad] (or psi1_deg, psi2_deg), both zero where a spoke stands along the slope's normal.
+
+The rig file says what is known: its values are where the search begins, and how far each is trusted stands in its
+section on uncertainty (docs/identify.md), or is assumed. The spring's rate is as the file says: free wheels tell
+masses, damping and friction only in proportion to it. Several recordings must be of the same rig.
 
 Exit status: 0 the trials are explained, 1 one is not (the sentence says where), 2 wrong input.
 
@@ -113,6 +115,9 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError('everything is fixed: there is nothing to identify')
     trials = []
     for path in options.recordings:
+        if path.suffix.lower() == '.csv':
+            trials.append(table_samples(path, known.rig, options.begin, options.end))
+            continue
         whole = Whole()
         trial, _ = read_trial(path, None, options.rig, options.topic, options.namespace, [whole])
         for text in (*trial.damage, *trial.notes):

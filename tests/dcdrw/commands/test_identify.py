@@ -3,6 +3,7 @@
 import json
 import math
 
+import numpy as np
 import pytest
 
 from dcdrw.cli import main
@@ -10,6 +11,8 @@ from dcdrw.recordings.joint_recording import record_joints
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file, read_uncertainty
 from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_msgs_py.samples import SECOND
+from dcdrw_sim.model.start import start
+from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatedRig, SimulatorParams
 from dcdrw_tracker.gait.phase import PhaseParams
 from tests.drawn import readable_figures
@@ -70,6 +73,47 @@ def test_an_uncertainty_that_makes_no_sense_is_refused(tmp_path, capsys, section
     path = tmp_path / 'rig.yaml'
     path.write_text(f'{RIG}uncertainty:\n  ros__parameters: {section}\n')
     assert main(['urdf', '--rig', str(path)]) == 2
+    assert message in capsys.readouterr().err
+
+
+def table(path, trial, heading='time,psi1_deg,note,psi2_deg'):
+    """Samples of a trial as a logger of encoders writes them."""
+    lines = [
+        f'{time},{math.degrees(front) if front == front else ""},x,{math.degrees(rear)}'
+        for time, (front, rear) in trial
+    ]
+    path.write_text('\n'.join([heading, *lines, '']))
+    return ['identify', str(path), '--rig', str(path.parent / 'rig.yaml'), '--fix', 'mass,slope,gyration,restitution']
+
+
+def test_a_table_of_encoders_with_gaps_is_taken(tmp_path, capsys):
+    (tmp_path / 'rig.yaml').write_text(RIG)
+    rig = RigParams(b=80.0)
+    motion = run(*start(rig, 0.3), 3.0)
+    times = np.arange(0.0, 3.0, 1 / 60)
+    seen = motion.at(times)
+    psi = np.column_stack([seen.rotation1, seen.rotation2]) + np.random.default_rng(1).normal(
+        0.0, 1e-3, (len(times), 2)
+    )
+    psi[60:70, 0] = math.nan
+    arguments = table(tmp_path / 'encoders.csv', zip(times.tolist(), psi.tolist(), strict=True))
+    assert main([*arguments, '--json']) == 0
+    found = json.loads(capsys.readouterr().out)['parameters']['b']
+    assert found['low'] < 80.0 < found['high']
+
+
+@pytest.mark.parametrize(
+    ('heading', 'rows', 'message'),
+    [
+        ('time,front,x,rear', [(0.0, (0.0, 0.0))], 'must have columns time, psi1, psi2'),
+        ('time,psi1,x,psi2', [(1.0, (0.0, 0.0)), (0.5, (0.0, 0.0))], 'line 3: time must go on'),
+        ('time,psi1,psi2,x', [(1.0, (0.0, 0.0))], "line 2: 'x' is not a number"),
+        ('time,psi1,x,psi2', [], 'has no samples'),
+    ],
+)
+def test_what_is_no_table_of_encoders_is_told(tmp_path, capsys, heading, rows, message):
+    (tmp_path / 'rig.yaml').write_text(RIG)
+    assert main(table(tmp_path / 'encoders.csv', rows, heading)) == 2
     assert message in capsys.readouterr().err
 
 
