@@ -30,6 +30,8 @@ ALIASES = {
     'kannala_brandt4': 'equidistant',
 }
 """Names that others give to the models."""
+WIDEST = 65_536
+"""No picture has more pixels a side."""
 NEWTON_STEPS = 20
 """Enough to invert any lens that can be inverted at all; three do for a usual one."""
 RAY_TOLERANCE = 1e-10
@@ -174,8 +176,10 @@ def make_camera(
         ValueError: a field is impossible, or the camera was never calibrated; `source` is named.
 
     """
-    if not (width >= 1 and height >= 1):
-        raise ValueError(f'{source}: image_width and image_height must be at least 1, got {width} and {height}')
+    if not (1 <= width <= WIDEST and 1 <= height <= WIDEST):
+        raise ValueError(
+            f'{source}: image_width and image_height must be from 1 to {WIDEST} pixels, got {width} and {height}'
+        )
     K: Floats = np.array(matrix, float)
     if K.size != 9 or not np.isfinite(K).all():
         raise ValueError(f'{source}: camera_matrix.data must be 9 finite numbers, got {[float(x) for x in K.flat]}')
@@ -184,6 +188,11 @@ def make_camera(
         raise ValueError(
             f'{source}: the focal lengths in camera_matrix.data must be > 0, got {K[0, 0]:g} and '
             f'{K[1, 1]:g}; calibrate the camera first (ros2 run camera_calibration cameracalibrator)'
+        )
+    if K[1, 0] or K[2, 0] or K[2, 1] or K[2, 2] != 1.0:
+        raise ValueError(
+            f'{source}: camera_matrix.data must be fx, 0, cx, 0, fy, cy, 0, 0, 1 row by row, got '
+            f'{[float(x) for x in K.flat]}{": it is transposed" if K[2, 0] and not K[0, 2] else ""}'
         )
     return Camera(int(width), int(height), K, _coefficients(model, np.array(coefficients, float).ravel(), source))
 

@@ -143,7 +143,13 @@ def content(**changes: object) -> dict[str, object]:
         ({'camera_matrix': {'rows': 3}}, r'camera\.yaml has no camera_matrix\.data'),
         ({'distortion_coefficients': None}, r'has no distortion_coefficients\.data'),
         ({'image_height': 'tall'}, r"image_height must be a whole number, got 'tall'"),
-        ({'image_height': 0}, 'image_width and image_height must be at least 1, got 1280 and 0'),
+        ({'image_height': 0}, 'image_width and image_height must be from 1 to 65536 pixels, got 1280 and 0'),
+        ({'image_width': 10**9}, 'must be from 1 to 65536 pixels, got 1000000000 and'),
+        (
+            {'camera_matrix': {'data': [900.0, 0.0, 0.0, 0.0, 905.0, 0.0, 640.0, 355.0, 1.0]}},
+            r'must be fx, 0, cx, 0, fy, cy, 0, 0, 1 row by row, got .*: it is transposed',
+        ),
+        ({'camera_matrix': {'data': [900.0, 0.0, 640.0, 0.0, 905.0, 355.0, 0.0, 0.0, 2.0]}}, 'row by row'),
         ({'camera_matrix': {'data': [1.0]}}, r'camera_matrix\.data must be 9 finite numbers, got \[1\.0\]'),
         ({'camera_matrix': {'data': ['a'] * 9}}, r'camera_matrix\.data must be a list of numbers'),
         (
