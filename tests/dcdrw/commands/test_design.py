@@ -108,6 +108,15 @@ def test_a_rig_that_is_known_with_errors_gets_the_coupler_that_is_surest_on_what
     assert (tmp_path / 'out' / 'card.png').exists()
 
 
+def test_where_the_mounting_lets_no_coupler_come_into_step_it_is_told(tmp_path, parts, capsys):
+    (tmp_path / 'rig.yaml').write_text('/**:\n  ros__parameters: {D0: 1.439}\n')
+    arguments = ['--rig', tmp_path / 'rig.yaml', '--available', parts, '--seconds', 15]
+    assert main(['design', *map(str, arguments)]) == 0
+    output = capsys.readouterr().out
+    assert 'at 50 %, where they are 1.215 m apart' in output
+    assert 'With 224 mm less of rods it is so at 50 %: try it, as D0: 1.215 in the rig file.' in output
+
+
 @pytest.mark.parametrize(
     ('arguments', 'message'),
     [
