@@ -111,6 +111,8 @@ class Stack:
         self.commands: list[tuple[float, float]] = []
         """When they were sent [s], and what [N]."""
         self.state = ''
+        self.states: list[str] = []
+        """All that were told."""
         self.enabled = False
         self._clients: dict[str, Any] = {}
         self._hear(JOINT_STATES, lambda one, when: self.joints.append((when, self._reader.read(one))))
@@ -235,6 +237,7 @@ class Stack:
 
     def _on_state(self, message: Any) -> None:
         self.state = message.data
+        self.states.append(message.data)
 
     def _beat(self) -> None:
         if self.enabled:
