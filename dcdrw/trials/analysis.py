@@ -27,6 +27,8 @@ from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseStatus
 from dcdrw_tracker.gait.rest import moves
 from dcdrw_tracker.gait.sync import SyncMonitor, SyncStatus
 
+FEWER = 100
+"""A source whose stamps advance so many times less than the time in which it is recorded has none."""
 LEARNED = 100
 """Samples after which the estimator knows their cadence."""
 
@@ -169,6 +171,7 @@ class _Trial:
         self._before = self._estimator.status().cadence
         self._last: PhaseSample | None = None
         self._unreadable = ''
+        self._slow_stamps = False
 
     def take(self, batch: JointBatch) -> None:
         """Feed one batch through both cores; wheels in messages of their own are joined first."""
@@ -220,8 +223,13 @@ class _Trial:
         )
 
     def _dated(self, batch: JointBatch) -> JointBatch:
-        """The same with the time of recording in place of missing stamps: zero while the wheels turn."""
-        missing = batch.stamp_ns == 0
+        """The same with the time of recording in place of missing stamps: zero while the wheels turn.
+
+        Stamps that run so much slower than the recording are in other units, milliseconds say: as good as missing.
+        """
+        if len(batch.log_ns) and np.ptp(batch.log_ns) > SECOND:
+            self._slow_stamps |= 0 < FEWER * int(np.ptp(batch.stamp_ns)) < int(np.ptp(batch.log_ns))
+        missing = np.full(batch.messages, True) if self._slow_stamps else batch.stamp_ns == 0
         if np.count_nonzero(missing) < 2 or not len(batch.log_ns) or not np.ptp(batch.position[missing], axis=0).any():
             return batch
         self._estimator.note_unstamped(int(np.count_nonzero(missing)))

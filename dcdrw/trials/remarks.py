@@ -52,7 +52,8 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         yield Remark('A gap was long enough to hide a step: n may be off.')
     if estimator.unstamped:
         yield Remark(
-            f'{_number_of(estimator.unstamped, "joint state")} had no stamp: the time of recording took its place.'
+            f'{_number_of(estimator.unstamped, "joint state")} had no stamp of use: '
+            'the time of recording took its place.'
         )
     if estimator.duplicates:
         yield Remark(f'{_number_of(estimator.duplicates, "joint state")} came again as they were, and count once.')

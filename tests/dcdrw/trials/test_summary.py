@@ -152,6 +152,16 @@ def test_a_clock_that_was_set_is_said_and_costs_nothing():
     assert summary.duration_s == pytest.approx(20.0, abs=0.1)
 
 
+@pytest.mark.parametrize('unit', [1000, 1_000_000])
+def test_stamps_in_other_units_give_way_to_the_time_of_recording(unit):
+    whole = batch(WALK)
+    summary = summarize(analyze([whole._replace(stamp_ns=whole.stamp_ns // unit)], TrialParams()))
+    assert summary.complete
+    assert summary.samples.unstamped == len(WALK)
+    assert f'{len(WALK)} joint states had no stamp of use: the time of recording' in summary.sentence
+    assert summary.steps_to_synchronization == summarize(trial(WALK)).steps_to_synchronization
+
+
 @pytest.mark.parametrize('size', [2, 3, 4, 7])
 def test_samples_in_bursts_give_the_same_verdict(size):
     """Stamped on arrival: each burst comes with the last of its samples, one 20 µs after the other."""
