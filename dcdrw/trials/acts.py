@@ -8,6 +8,8 @@ from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.recording import Recording
 from dcdrw_msgs_py.topics import SYNCHRONIZER_STATE
 
+EVERY = 64
+"""Of so many messages one is remembered: a source that lags more and more is followed."""
 Acts = tuple[tuple[int, str], ...]
 """Stamps, and what the synchronizer did from then on."""
 
@@ -25,11 +27,11 @@ class Clock:
         return bool(self._log_ns)
 
     def watch(self, batches: Iterable[JointBatch]) -> Iterator[JointBatch]:
-        """The same batches, of each of which a message is remembered."""
+        """The same batches, of each of which every so many messages are remembered."""
         for batch in batches:
-            if len(batch.log_ns) and len(batch.stamp_ns):
-                self._log_ns.append(int(batch.log_ns[-1]))
-                self._stamp_ns.append(int(batch.stamp_ns[-1]))
+            if len(batch.log_ns) == len(batch.stamp_ns):
+                self._log_ns += batch.log_ns[::EVERY].tolist()
+                self._stamp_ns += batch.stamp_ns[::EVERY].tolist()
             yield batch
 
     def stamps(self, log_ns: list[int]) -> list[int]:
