@@ -28,6 +28,10 @@ from dcdrw_msgs_py.values import Floats
 FASTEST = 35.0
 """No leg turns faster [rad/s], and gyroscopes end at 2000 degrees per second: a file with larger rates is in deg/s."""
 _COLUMN = re.compile(r'(?:(front|rear)_)?(?:(left|right)_)?(acc_[xyz]|gyr_[xyz]|contact|force|hip|hip_rate)')
+_UNIT = re.compile(r'\s*[\[(].*')
+"""What stands behind a column's name: its unit."""
+LATEST = 9e9
+"""A later time is none that a stamp can tell [s]."""
 _TIMES = {'time': 1.0, 'time_s': 1.0, 'stamp_ns': 1.0 / SECOND}
 
 
@@ -84,24 +88,34 @@ def read_legs(path: Path, rate: float = math.nan) -> LegTable:
 
 
 def _read(path: Path) -> tuple[list[str], Floats]:
-    rows = [row for _, row in read_rows(path)]
-    heads = [row for row in rows[:2] if not _is_number(row[-1])]
+    lines = list(read_rows(path))
+    rows = [row for _, row in lines]
+    if rows and len(rows[0]) == 1 and set(';\t') & set(rows[0][0]):
+        raise ValueError(f'{path}: its columns should have commas between them')
+    heads = [row for row in rows[:2] if not any(map(_is_number, row))]
     if len(heads) == 2:
         names = [f'{sensor.removesuffix("_sensor")}_{axis}' for sensor, axis in zip(*heads, strict=False)]
         names[0] = 'sample'
     elif heads:
-        names = [name.strip() for name in heads[0]]
+        names = [_UNIT.sub('', name).strip().lower() for name in heads[0]]
     elif rows and len(rows[0]) == 2:
         names = ['time', 'left_force']
     else:
         raise ValueError(f'{path} names no columns: its first row should be time,left_gyr_x,…')
-    try:
-        table = np.array([[float(cell) if cell else math.nan for cell in row] for row in rows[len(heads) :]])
-    except ValueError as error:
-        raise ValueError(f'{path}: {error}') from None
-    if table.ndim != 2 or table.shape[1] != len(names) or len(table) < 2:
+    twice = next((name for place, name in enumerate(names) if name in names[:place]), None)
+    if twice is not None:
+        raise ValueError(f'{path} has two columns {twice}')
+    table: list[list[float]] = []
+    for line, row in lines[len(heads) :]:
+        if len(row) != len(names):
+            raise ValueError(f'{path}, line {line}: {len(row)} cells, not {len(names)} as in the first row')
+        wrong = next((cell for cell in row if cell and not _is_number(cell)), None)
+        if wrong is not None:
+            raise ValueError(f'{path}, line {line}: {wrong!r} is not a number')
+        table.append([float(cell) if cell else math.nan for cell in row])
+    if len(table) < 2:
         raise ValueError(f'{path}: every row should have {len(names)} numbers, and there should be some')
-    return names, table
+    return names, np.array(table)
 
 
 def _seconds(path: Path, name: str, first: Floats, rate: float) -> Floats:
@@ -111,6 +125,8 @@ def _seconds(path: Path, name: str, first: Floats, rate: float) -> Floats:
         seconds = first * _TIMES[name]
     else:
         raise ValueError(f'{path} has no column time or stamp_ns: tell how many samples a second it has (--rate)')
+    if not (np.abs(seconds) < LATEST).all():
+        raise ValueError(f'{path}: a time in column {name} is none, or beyond {LATEST:g} s')
     if not (np.diff(seconds) > 0.0).all():
         raise ValueError(f'{path}: the time in column {name} must grow from row to row')
     return seconds

@@ -61,7 +61,12 @@ def test_a_file_of_one_leg_names_no_side_and_needs_no_time_where_the_rate_is_giv
         ('', 'names no columns'),
         ('time,left_force\n', 'there should be some'),
         ('time,speed\n0,1\n1,2\n', 'no column of a leg'),
-        ('time,left_force\n0,1\n1,two\n', 'two'),
+        ('time,left_force\n0,1\n1,two\n', "line 3: 'two' is not a number"),
+        ('time,left_force\n0,1\n1\n', 'line 3: 1 cells, not 2 as in the first row'),
+        ('time,left_force\n0,1\ninf,2\n', 'a time in column time is none'),
+        ('time,left_force\n0,1\n1e30,2\n', 'a time in column time is none'),
+        ('time;left_force\n0;1\n1;2\n', 'should have commas between them'),
+        ('time,left_force,left_force\n0,1,2\n1,2,3\n', 'has two columns left_force'),
         ('time,left_force\n0,1\n0,2\n', 'must grow'),
         ('sample,left_force\n0,1\n1,2\n', '--rate'),
         ('time,left_gyr_x\n0,1\n1,2\n', 'left_gyr_y'),
@@ -73,3 +78,11 @@ def test_a_file_that_cannot_be_read_says_why(tmp_path, text, told):
     with pytest.raises(ValueError, match=told) as error:
         read_legs(path)
     assert str(path) in str(error.value)
+
+
+def test_names_are_read_in_any_case_and_with_their_units_and_an_empty_cell_makes_no_row_a_heading(tmp_path):
+    path = tmp_path / 'named.csv'
+    path.write_text('Time [s],Left_Force (N),right_force\n0,1,\n1,2,3\n')
+    forces = [(str(reading.leg), reading.reading.force) for reading in read_legs(path).readings]
+    assert forces[0] == ('front_left', 1.0)
+    assert len(forces) == 4
