@@ -203,13 +203,23 @@ class Problem:
         return Problem(known, self.trials, self._deviations, self._used, self._zero), square
 
     def solve(self, x: Floats, robust: bool = True, settled: float = ROUGHLY, evaluations: int = EVALUATIONS) -> Floats:
-        """The best point, from x on."""
+        """The best point, from x on; errors that repeat are sought in the end only, where it is not robust."""
         inside = np.clip(x, self.low, self.high)
+        free = np.ones(len(x), bool)
+        if robust:
+            for trial in range(len(self.trials)):
+                free[self._own(trial)[START:]] = np.tile(np.arange(1 + PARTS) == 0, 2)
+
+        def whole(sought: Floats) -> Floats:
+            point: Floats = inside.copy()
+            point[free] = sought
+            return point
+
         found = least_squares(
-            self.residuals,
-            inside,
-            self.jacobian,
-            bounds=(self.low, self.high),
+            lambda sought: self.residuals(whole(sought)),
+            inside[free],
+            lambda sought: self.jacobian(whole(sought))[:, free],
+            bounds=(self.low[free], self.high[free]),
             method='dogbox',
             x_scale='jac',
             loss='soft_l1' if robust else 'linear',
@@ -219,8 +229,7 @@ class Problem:
             gtol=1e-10,
             max_nfev=evaluations,
         )
-        best: Floats = found.x
-        return best
+        return whole(np.asarray(found.x, float))
 
     def information(self, x: Floats) -> Floats:
         """What the trials tell of the unknowns, their own being unknown: an inverse covariance, shape (P, P)."""
