@@ -107,7 +107,7 @@ export function drawPhi(points, now, board, over) {
 }
 
 // Cut where a gap in time or a jump must not be joined by a line.
-function* pieces(points, jumps) {
+export function* pieces(points, jumps) {
   const gap = Math.max(3 * usualStep(points), SHORTEST_GAP);
   let piece = [];
   for (const point of points) {
