@@ -222,7 +222,8 @@ def _finish(course: Course, folder: Path, options: argparse.Namespace) -> int:
         failure = failure or in_words(error)
     if failure:
         print(f'dcdrw trial: {failure}', file=sys.stderr)
-    if course.interrupted:
+    elif course.interrupted:
         print('dcdrw trial: interrupted; what came before is kept', file=sys.stderr)
+    if course.interrupted:
         return interrupted_status(course.interrupted)
     return expectation_status(options.expect, [trial.state]) if summary.complete and not failure else 1

@@ -69,6 +69,8 @@ class Rotation:
         """Mean speed of the last second [rad/s]."""
         self._told = self.pace
         """What the mean speed would be by the speeds that the source gives [rad/s]."""
+        self._doubted = 0.0
+        """For how long these two have contradicted one another [s]."""
         self.disbelieved = 0
         """Samples whose speed does not go with the rotations, and is not used."""
         self.speed = abs(self.pace)
@@ -219,7 +221,10 @@ class Rotation:
             rate = slope
         else:
             self._told += (rate - self._told) * dt / memory
-            if abs(self._told - self.pace) > 0.5 * max(abs(self.pace), LEAST_PACE):  # zero, say, or in other units
+            agrees = abs(self._told - self.pace) <= 0.5 * max(abs(self.pace), LEAST_PACE)
+            # A wheel that is let go within a gap has not turned as far as its speed tells: that passes within a second.
+            self._doubted = 0.0 if agrees else self._doubted + min(dt, 0.1 * PACE_MEMORY)
+            if self._doubted > PACE_MEMORY:  # zero, say, or in other units
                 self.disbelieved += 1
                 rate = slope
         self.rate = rate

@@ -539,11 +539,21 @@ def test_speeds_that_do_not_go_with_the_rotations_are_not_used(factor: float) ->
     plain, plain_falls, plain_status = run(samples)
     assert falls == plain_falls
     assert [phase.phi.angle for phase in phases] == [phase.phi.angle for phase in plain]
-    settled = slice(100, None)
+    settled = slice(400, None)  # after two seconds
     given, right = (np.array([phase.front.rate for phase in each[settled]]) for each in (phases, plain))
     assert np.abs(given - right).mean() < 0.05
     assert plain_status.disbelieved == 0
-    assert status.disbelieved > 0.9 * len(samples) or factor > 20.0  # beyond max_speed it is none at all
+    assert status.disbelieved > 0.75 * len(samples) or factor > 20.0  # beyond max_speed it is none at all
+
+
+@pytest.mark.parametrize('missing', range(0, 12, 2))
+def test_speeds_of_a_wheel_that_is_let_go_within_a_gap_are_used(missing: int) -> None:
+    moving = walk(8.0).samples()[::7]  # as of a camera
+    still = Turn(moving[0].front.angle, 0.0), Turn(moving[0].rear.angle, 0.0)
+    held = [JointSample(moving[0].stamp_ns - (i + 1) * 33_000_000, *still) for i in reversed(range(60))]
+    phases, _, status = run(held + moving[1 + missing :])
+    assert status.disbelieved == 0
+    assert [phase.front.rate for phase in phases[-100:]] == [sample.front.rate for sample in moving[-100:]]
 
 
 def test_a_counter_of_unknown_width_asks_for_the_parameter_that_makes_it_good() -> None:
