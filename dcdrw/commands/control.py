@@ -158,15 +158,15 @@ def _summary_lines(found: _Found) -> Iterator[str]:
     yield from found.report
     yield f'multipliers   {_moduli(found.without)} without the law'
     yield f'              {_moduli(found.closed)} with it'
-    yield f'unstable      {_edge(found.edges.gain, "times this gain")}; {_edge(found.edges.delay, "s", " of delay")}'
+    yield f'unstable      {_edge(found.edges.gain, "times this", "gain")}; {_edge(found.edges.delay, "s of", "delay")}'
 
 
 def _moduli(values: Any) -> str:
     return ', '.join(f'{abs(value):.4f}' for value in values)
 
 
-def _edge(value: float, unit: str, of: str = '') -> str:
-    return f'from {value:.3g} {unit}{of} on' if math.isfinite(value) else f'at no{of or " gain"} that was looked at'
+def _edge(value: float, unit: str, name: str) -> str:
+    return f'from {value:.3g} {unit} {name} on' if math.isfinite(value) else f'at no {name} that was looked at'
 
 
 def _json_record(found: _Found, parameters: dict[str, Any]) -> dict[str, Any]:

@@ -39,6 +39,8 @@ _CHUNK = struct.Struct('<QQQII')
 _MESSAGE = struct.Struct('<BQHIQ')
 """Kind and length, then channel, sequence number, log time; the publish time follows."""
 _MESSAGE_HEAD = _HEAD.size + 22
+_FOOTER = struct.Struct('<9xQQI')
+"""Kind and length, then the place of the summary and of its offsets, and the checksum of all up to it."""
 _PARSED: dict[int, Any] = {
     Opcode.HEADER: Header,
     Opcode.SCHEMA: Schema,
@@ -97,6 +99,8 @@ class McapFile(BagFile):
             self._schemas: dict[int, Schema] = {}
             self._channels: dict[int, Channel] = {}
             self._statistics: Statistics | None = None
+            self._told_by_data: tuple[dict[int, Schema], dict[int, Channel]] = {}, {}
+            """What the file tells before its summary."""
             self._pieces: list[_Piece] = []
             self._looks = 0
             self._walk()
@@ -277,6 +281,21 @@ class McapFile(BagFile):
             self._take_message(at, end)
         elif kind in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS):
             self._describe(kind, self._bytes(at + _HEAD.size, end - at - _HEAD.size, _LONGEST_TEXT))
+        elif kind == Opcode.DATA_END:
+            self._told_by_data = dict(self._schemas), dict(self._channels)
+        elif kind == Opcode.FOOTER and not self._is_summary_whole(at):
+            self._note('summary', f'the summary before byte {at} is damaged')
+            (self._schemas, self._channels), self._statistics = self._told_by_data, None
+
+    def _is_summary_whole(self, footer: int) -> bool:
+        """Whether the summary that ends with this footer has the checksum that was written, if one was."""
+        at, _, checksum = _FOOTER.unpack(self._bytes(footer, _FOOTER.size))
+        if not at or not checksum:  # there is none
+            return True
+        found, end = 0, footer + _FOOTER.size - 4
+        while at < end and (block := os.pread(self._file.fileno(), min(_BLOCK, end - at), at)):
+            found, at = zlib.crc32(block, found), at + len(block)
+        return found == checksum
 
     def _take_message(self, at: int, end: int) -> None:
         """A message outside of chunks: it joins the row that it ends."""

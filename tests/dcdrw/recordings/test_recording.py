@@ -152,6 +152,7 @@ def test_recording_cut_anywhere_keeps_every_whole_chunk(unclosed, tmp_path_facto
 @settings(max_examples=100, suppress_health_check=list(HealthCheck))
 @given(share=st.floats(0.0, 1.0, exclude_max=True), bit=st.integers(0, 7), closed=st.booleans())
 @example(share=0.943359375, bit=0, closed=True)
+@example(share=0.89453125, bit=0, closed=True)
 def test_flipped_bit_costs_its_chunk_at_most(unclosed, whole, tmp_path_factory, share, bit, closed):
     place = 0
 
