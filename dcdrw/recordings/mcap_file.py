@@ -295,7 +295,7 @@ class McapFile(BagFile):
         found, end = 0, footer + _FOOTER.size - 4
         while at < end and (block := os.pread(self._file.fileno(), min(_BLOCK, end - at), at)):
             found, at = zlib.crc32(block, found), at + len(block)
-        return found == checksum
+        return bool(found == checksum)
 
     def _take_message(self, at: int, end: int) -> None:
         """A message outside of chunks: it joins the row that it ends."""
