@@ -47,7 +47,7 @@ def steady_contacts(phase: float, strides: int = 1) -> list[Contact]:
         raise ValueError(f'phase must be in [0, 1), got {phase}')
     return sorted(
         (
-            Contact(foot, start, start + 0.5)
+            Contact(foot, start, delay + (step + 1) / 2.0)  # to the bit when the other foot falls
             for pair, delay in ((_FRONT, 0.0), (_REAR, phase / 2.0))
             for step in range(-2, 2 * strides)
             for foot, start in ((pair[step % 2], delay + step / 2.0),)

@@ -1,5 +1,5 @@
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.start import start
@@ -51,6 +51,7 @@ def test_strikes_at_once_make_a_trot_and_nearly_a_step_apart_a_pace():
 
 @quick
 @given(between(0.0, 0.999), between(0.01, 1.99))
+@example(0.02, 0.01)
 def test_one_front_and_one_rear_foot_are_always_on_the_ground(phase, time):
     standing = [contact.foot for contact in steady_contacts(phase, 2) if contact.start <= time < contact.end]
     assert sorted(foot > 2 for foot in standing) == [False, True]
