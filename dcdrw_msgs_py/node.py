@@ -334,8 +334,16 @@ def publishers(node: Node, topic: Topic) -> list[str]:
     return sorted(f'{end.node_namespace.rstrip("/")}/{end.node_name}' for end in ends)
 
 
-def publish_diagnosis(node: Node, diagnose: Callable[[], Diagnosis]) -> Callable[[], None]:
+def publish_diagnosis(
+    node: Node, diagnose: Callable[[], Diagnosis], warns_of_losses: bool = True
+) -> Callable[[], None]:
     """Publish a node's diagnosis once a second, by a clock that goes on where simulated time stands still.
+
+    Args:
+        node: the node.
+        diagnose: what it says of itself.
+        warns_of_losses: whether many samples lost within a second are a warning; else the node judges that itself, as
+            one does that passes over frames while it works.
 
     Returns:
         publishes it at once: to be called when the node's state has changed.
@@ -349,7 +357,7 @@ def publish_diagnosis(node: Node, diagnose: Callable[[], Diagnosis]) -> Callable
         nonlocal missing
         diagnosis, lost = diagnose(), dropped(node)
         before, missing = missing, diagnosis.values.get(LOST_SAMPLES, 0)
-        diagnosis = lost_since(diagnosis, before)
+        diagnosis = lost_since(diagnosis, before) if warns_of_losses else diagnosis
         values = {**diagnosis.values, **{f'messages dropped of {topic}': count for topic, count in lost.items()}}
         level, message = diagnosis.level, diagnosis.message
         if lost != told:

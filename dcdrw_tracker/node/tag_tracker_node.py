@@ -93,7 +93,7 @@ class TagTrackerNode(Node):
                 self._tags, self._view.value, self._track.value, self._source.detector, first_run
             )
             self._start_on_pictures()
-        publish_diagnosis(self, self._diagnose)
+        publish_diagnosis(self, self._diagnose, warns_of_losses=False)
 
     def destroy_node(self) -> None:
         """End the threads first: they publish."""
