@@ -41,7 +41,7 @@ from dcdrw_msgs_py.in_step import BAND_PERCENT, HOLD_STEPS, in_step_from, strike
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.rolling import steps_ahead
 from dcdrw_msgs_py.samples import SECOND, JointSample, PhaseSample, Turn
-from dcdrw_sim.map.holding import Law, Method, corners, eased, law, plant, plants_near
+from dcdrw_sim.map.holding import UNCERTAIN, Law, Method, corners, eased, law, plant, plants_near
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.model.start import start
@@ -59,8 +59,6 @@ SECONDS = 10.0
 """Length of a walk with a law."""
 PASSIVE_SECONDS = 60.0
 DELAY = 0.05
-UNCERTAIN = 0.3
-"""Masses, b and k are each so much less or more."""
 HELD_GAIN, PROPORTIONAL_GAIN = 80.0, 150.0
 """[N per step]"""
 SLOPES = (1.5, 2.0, 2.5, 3.0)

@@ -6,9 +6,8 @@ Simulated people walk as the front wheel of the simulator does (1 kHz, through t
 variability of a stride, or every step evenly within ±10 % of the mean; one stops now and then, at any place of a
 stride, stands and starts again, told by leg phases alone, and is judged by the node's own count. The recorded people
 are those in tests/data/gait, their legs by the leg tracker; a foot on the force plate stands for both legs, half a
-stride apart. A
-trajectory takes `lead` (50 ms) to the joints. The phase that it carries is held against a quarter of each true stride:
-motion capture's and the plate's where people were recorded.
+stride apart. A trajectory takes `lead` (50 ms) to the joints. The phase that it carries is held against a quarter of
+each true stride: motion capture's and the plate's where people were recorded.
 
 Columns: the robot's footfalls in the whole gait; their distance from a quarter stride ahead, rms [ms] (goal: 25 ms);
 steps of the four feet in the order 1-4-2-3 (goal: 99 %); how often the node would have said WARN or ERROR of the order;

@@ -160,7 +160,7 @@ def _rows(path: Path, text: str, separator: str) -> Iterator[tuple[int, list[str
 
 def _column(heading: str) -> tuple[str, str]:
     """What a heading is of, and the unit that stands in it, in brackets or not."""
-    words = re.sub(r'[\[(_,]', lambda sign: f' {sign[0].strip("_,")}', heading.strip('"\ufeff \r\n'), count=0).split()
+    words = re.sub(r'[\[(_,]', lambda sign: f' {sign[0].strip("_,")}', heading.strip('"\ufeff \r\n')).split()
     for count in range(len(words), 0, -1):
         if column := COLUMNS.get('_'.join(words[:count]).lower().rstrip(':')):
             unit = ' '.join(words[count:]).removeprefix('in ')

@@ -15,7 +15,7 @@ from dcdrw_control.sync.safety import Limits
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.yaml_file import yaml_text
-from dcdrw_sim.map.holding import METHODS, TARGETS, Margins, eased, law, margins, plant, plants_near
+from dcdrw_sim.map.holding import METHODS, TARGETS, UNCERTAIN, Margins, eased, law, margins, plant, plants_near
 from dcdrw_sim.map.return_map import Complexes
 from dcdrw_tracker.gait.sync import SyncParams
 
@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     hold.add_argument(
         '--uncertain',
         type=number,
-        default=30.0,
+        default=100.0 * UNCERTAIN,
         metavar='PERCENT',
         help='masses, damping and stiffness may each be so much less or more than the rig says (default: %(default)g)',
     )

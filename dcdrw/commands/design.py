@@ -78,8 +78,8 @@ are as likely; the surest is the best on the worst of these.
 tabs or bars (config/parts.csv shows one). Kind is spring or dashpot, or damper; units stand in the heading (value
 [N/mm]), in a column unit, or in the cell (0.1 N·s/mm), else they are N/m and N·s/m. Where it has columns max_force,
 max_stroke and max_speed, no pair is recommended that asks for more of a part; from a column free_length, the card tells
-which rods to add. Every pair is judged, in the place of the
-search, and those that come into step are listed, the best first; --out writes all of them to pairs.csv.
+which rods to add. Every pair is judged, in the place of the search, and those that come into step are listed, the best
+first; --out writes all of them to pairs.csv.
 
 examples:
   dcdrw design                                            for the paper's rig

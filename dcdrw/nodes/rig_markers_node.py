@@ -93,9 +93,10 @@ class RigMarkersNode(Node):
 
     def _draw(self) -> None:
         acts = self._acts if self._acts_age.seconds <= LIFETIME else ''
-        if self._person_age.seconds > LIFETIME:
+        walks = self._person_age.seconds <= LIFETIME
+        if not walks:
             self._person_force = math.nan
-        person_force = self._person_force if self._person_age.seconds <= LIFETIME else None
+        person_force = self._person_force if walks else None
         shapes = self._view.shapes(self._caption(), acts, person_force)
         if not shapes:
             return

@@ -44,9 +44,7 @@ class Clock:
 def recorded_acts(recording: Recording, namespace: str, clock: Clock) -> Acts:
     """What the synchronizer of a namespace did; nothing where none was recorded. The joint states must be read."""
     topic = f'{namespace}/{SYNCHRONIZER_STATE.name}'
-    if recording.types.get(topic) != SYNCHRONIZER_STATE.type:
-        return ()
-    if not clock.runs:
+    if recording.types.get(topic) != SYNCHRONIZER_STATE.type or not clock.runs:
         return ()
     said = [(log_ns, str(message.data)) for _, log_ns, message in recording.decoded([topic])]
     return tuple(zip(clock.stamps([log_ns for log_ns, _ in said]), (state for _, state in said), strict=True))

@@ -38,6 +38,8 @@ EDGE_SAMPLES = 40
 """Gains or delays that are tried along the way; between two of them the edge is found exactly."""
 EDGE = 1e-4
 """To so much of the range of the search."""
+UNCERTAIN = 0.3
+"""Masses, damping and stiffness of a rig may each be such a share less or more than is known."""
 SWING_SAMPLES = 1001
 """Times within a step at which its swing is looked at."""
 WHOLE_STEP = 0.999
