@@ -1,5 +1,6 @@
 """What every node does alike: declare parameters, advertise, listen, report, spin, and end cleanly."""
 
+import ctypes
 import faulthandler
 import gc
 import math
@@ -465,6 +466,14 @@ def run_all(name: str, make_nodes: Callable[[], list[Node]], args: list[str] | N
     for node in nodes:
         node.destroy_node()
     rclpy.try_shutdown()
-    for number in (signal.SIGINT, signal.SIGTERM):  # Python itself ends now, and would die of a second signal
-        signal.signal(number, signal.SIG_IGN)
+    ignore_end_signals()  # Python itself ends now, and would die of a second one
     return 0
+
+
+def ignore_end_signals() -> None:
+    """Ignore SIGINT and SIGTERM from here on, also one that comes meanwhile."""
+    ignore = ctypes.c_void_p(int(signal.SIG_IGN))
+    for number in (signal.SIGINT, signal.SIGTERM):
+        # Linux first: Python, told alone, complains at length of one that has come before Linux ignores them.
+        ctypes.pythonapi.PyOS_setsig(int(number), ignore)
+        signal.signal(number, signal.SIG_IGN)
