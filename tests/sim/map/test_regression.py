@@ -123,18 +123,26 @@ def test_all_measures_stand_side_by_side():
     assert found.affine.matrix.shape == (3, 3)
 
 
-def test_a_trial_that_slips_is_told_and_left_out():
-    found = measure(WEAK, phases=(0.0, 0.4), steps=5)
-    slipped, whole = found.trials
-    assert (slipped.steps_to_cycle, slipped.states.shape) == (None, (0, 3))
-    assert 'slipped a step' in slipped.trouble
+STIFF = preset('paper-sweep')._replace(k=1000.0)
+
+
+def test_a_trial_that_does_not_walk_on_is_told_and_left_out():
+    found = measure(ReturnMap(STIFF._replace(b=10.0)), phases=(0.9, 0.3), steps=5)
+    rocked, whole = found.trials
+    assert (rocked.steps_to_cycle, rocked.states.shape) == (None, (0, 3))
+    assert 'rocked back' in rocked.trouble
     assert not whole.trouble
     assert found.affine.matrix == pytest.approx(fit_affine([whole.states]).matrix)
 
 
 def test_the_fixed_point_is_told_where_every_trial_fails():
-    found = measure(WEAK, phases=(0.0,), steps=5)
+    found = measure(ReturnMap(STIFF._replace(b=1.0)), phases=(0.9,), steps=5)
     assert found.raw is None
     assert found.affine is None
     assert found.fixed_point.derivative.shape == (3, 3)
-    assert 'slipped' in found.trials[0].trouble
+    assert 'rocked back' in found.trials[0].trouble
+
+
+def test_trials_are_those_of_the_map_step_by_step():
+    (trial,) = measure(MAP, phases=(0.2,), steps=30).trials
+    assert trial.states == pytest.approx(MAP.iterate(MAP.at_phase(0.2), 30), rel=0, abs=1e-12)
