@@ -91,11 +91,16 @@ def domain(text: str) -> int:
 def phase_percent(text: str) -> float:
     """Parse a phase in percent of a step; a part of one, as 0.216, is asked about unless it ends in %."""
     value = number(text.removesuffix('%'))
-    if 0.0 < abs(value) < 1.0 and not text.endswith('%'):
-        raise argparse.ArgumentTypeError(
-            f'is in percent of a step: {text} means {100.0 * value:g} %? Then give {100.0 * value:g}, else {text}%'
-        )
+    if question := part_of_one(value, text):
+        raise argparse.ArgumentTypeError(question)
     return value
+
+
+def part_of_one(percent: float, text: str) -> str:
+    """What is asked about percents of a step that look like a part of one, as 0.216; empty where they do not."""
+    if text.endswith('%') or not 0.0 < abs(percent) < 1.0:
+        return ''
+    return f'is in percent of a step: {text} means {100.0 * percent:g} %? Then give {100.0 * percent:g}, else {text}%'
 
 
 def degrees(text: str) -> float:

@@ -89,8 +89,8 @@ class Field(NamedTuple):
 
     def _read(self, value: Any) -> Any:
         """What was meant, where ROS or `ros2 param` takes it for something else."""
-        if self.kind is float and isinstance(value, str):  # nan, 1e-05
-            found = number(value)
+        if self.kind is float and isinstance(value, str):  # nan, 1e-05, 0.2%
+            found = number(value.removesuffix('%') if self.quantity.unit.startswith('%') else value)
             return value if found is None else found
         if self.kind is str and isinstance(value, bool):  # off
             return next((word for word in self.quantity.choices if parse_yaml(word) is value), value)

@@ -12,6 +12,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import ExecutableInPackage, FindPackageShare
 
 from dcdrw.commands.urdf import make_urdf
+from dcdrw.console import phase_percent
 from dcdrw.suite.hub_gains import hub_gains
 from dcdrw.suite.parameter_file import TrialParams, given, read_parameter_file
 
@@ -150,7 +151,11 @@ def _actions(context):
         rate = ['--rate', pace] if pace else []
         actions.append(command('replay', chosen['recording'], *rate, namespace='--into'))
     else:
-        numbers = {name: float(chosen[name]) for name in ('initial_phase_percent', 'real_time_factor') if chosen[name]}
+        numbers = {
+            name: parse(chosen[name])
+            for name, parse in {'initial_phase_percent': phase_percent, 'real_time_factor': float}.items()
+            if chosen[name]
+        }
         walk = {'person.walks': True} if person else {}
         actions.append(node('simulator', use_sim_time=False, publish_clock=simulated, **numbers, **walk))
     return [*actions, *map(_ends_all, actions)] if chosen['on_exit'] == 'end' else actions

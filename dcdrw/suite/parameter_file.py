@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple, TypeVar, get_args
 
 import numpy as np
 
-from dcdrw.console import count, degrees, number
+from dcdrw.console import count, degrees, number, part_of_one
 from dcdrw.suite.executables import EXECUTABLES
 from dcdrw_msgs_py.quantity import Field, Quantity, build, fields, flatten, suggestion
 from dcdrw_msgs_py.rig import RigParams, WheelPitch, WheelShape
@@ -25,6 +25,7 @@ _EVERY = ('**', '*')
 """In place of a node's name, or of a namespace: any, of as many names as may be, or of one."""
 _PARAMETERS = 'ros__parameters'
 _OF_ROS = ('use_sim_time',)
+_PHASE = 'initial_phase_percent'
 _UNCERTAINTY = 'uncertainty'
 """The section that tells how well a rig is known: to ROS the parameters of a node that nobody starts."""
 _ERRORS, _CORRELATIONS = 'standard_errors', 'correlations'
@@ -84,6 +85,8 @@ def read_parameter_file(path: Path, base: Sets, namespace: str = '') -> Sets:
                 values |= its
         chosen = {key: value for key, value in values.items() if key in mine or key not in all_names}
         sets[name] = build(kind, flatten(getattr(base, name)) | chosen, str(path))
+        if _PHASE in chosen and (question := part_of_one(getattr(sets[name], _PHASE), str(chosen[_PHASE]))):
+            raise ValueError(f'{_PHASE} {question} ({path})')
     return type(base)(**sets)
 
 

@@ -105,3 +105,13 @@ def test_what_is_no_parameter_file_is_refused_in_one_line(text, message, tmp_pat
         read_parameter_file(path, TrialParams())
     assert str(path) in str(error.value)
     assert '\n' not in str(error.value)
+
+
+def test_a_phase_below_one_percent_is_asked_about(tmp_path):
+    path = tmp_path / 'trial.yaml'
+    path.write_text('simulator: {ros__parameters: {initial_phase_percent: 0.216}}', encoding='utf-8')
+    with pytest.raises(ValueError, match=r'0\.216 means 21\.6 %\? Then give 21\.6, else 0\.216% \(.*trial.yaml'):
+        read_parameter_file(path, TrialParams())
+    for text, value in (('0.216%', 0.216), ('21.6', 21.6), ('0', 0.0)):
+        path.write_text(f'simulator: {{ros__parameters: {{initial_phase_percent: {text}}}}}', encoding='utf-8')
+        assert read_parameter_file(path, TrialParams()).simulator.initial_phase_percent == value
