@@ -26,25 +26,30 @@ class SagittalAxis:
     def __init__(self) -> None:
         self._scatter = [0.0] * 6
         self._looked = 0.0
-        self._axis: Vector = (0.0, 0.0, 0.0)
+        self.axis: Vector = (0.0, 0.0, 0.0)
+        """A unit vector in the sensor's frame; zero before anything has turned."""
 
-    def update(self, rate: Vector, dt: float) -> float:
-        """Take an angular rate [rad/s] that held for dt [s]; its part about the axis as known now [rad/s]."""
+    def update(self, rate: Vector, dt: float) -> None:
+        """Take an angular rate [rad/s] that held for dt [s]."""
         x, y, z = rate
         products = (x * x, y * y, z * z, x * y, x * z, y * z)
         self._scatter = [seen + dt * product for seen, product in zip(self._scatter, products, strict=True)]
         seen = sum(self._scatter[:3])
         if seen > GROWTH * self._looked:
             self._looked = seen
-            self._axis = self._principal()
-        u, v, w = self._axis
+            self.axis = self._principal()
+
+    def part(self, rate: Vector) -> float:
+        """The part of an angular rate about the axis as known now [rad/s]."""
+        x, y, z = rate
+        u, v, w = self.axis
         return u * x + v * y + w * z
 
     def _principal(self) -> Vector:
         """The first principal axis, nearer to the one before than to its opposite."""
         xx, yy, zz, xy, xz, yz = self._scatter
         axis = np.linalg.eigh(np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))))[1][:, -1]
-        u, v, w = (axis if axis @ np.array(self._axis) >= 0.0 else -axis).tolist()
+        u, v, w = (axis if axis @ np.array(self.axis) >= 0.0 else -axis).tolist()
         return u, v, w
 
     def forget(self) -> None:

@@ -200,11 +200,18 @@ class _Track:
 
     def lose(self) -> None:
         """Its sensor was silent: what it did meanwhile is unknown."""
+        self._gap()
+        if self._detector:
+            self._detector.reset()
+
+    def _gap(self) -> None:
         self._gaps += 1
         self.phase.lose()
         self._events = []
-        if self._detector:
-            self._detector.reset()
+
+    @property
+    def _mounted(self) -> bool:
+        return getattr(self._detector, 'mounted', True)
 
     def take(self, reading: LegReading, hip_lead: float) -> None:
         """Take the next reading."""
@@ -213,7 +220,10 @@ class _Track:
         if kind != self.kind:
             self.kind, self._detector = kind, _DETECTORS[kind]()
         self.stamp_ns = stamp_ns
+        was_mounted = self._mounted
         events = self._detector.update(stamp_ns, *values)
+        if was_mounted and not self._mounted:
+            self._gap()
         if kind == 'hip' and hip_lead and self.phase.known:
             late_ns = round(hip_lead * self.phase.period * SECOND)
             events = [event._replace(stamp_ns=event.stamp_ns + late_ns) for event in events]
@@ -231,7 +241,7 @@ class _Track:
         return LegStatus(
             self.kind,
             self.kind is not None and not heard,
-            getattr(self._detector, 'mounted', True),
+            self._mounted,
             heard and phase.known,
             phase.strikes,
             phase.missed,

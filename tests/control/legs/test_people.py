@@ -18,9 +18,10 @@ from legs import (
     treadmill,
     truth,
 )
+from scipy.spatial.transform import Rotation
 
 from dcdrw_control.legs.accuracy import judge_strikes
-from dcdrw_control.legs.samples import Leg
+from dcdrw_control.legs.samples import ImuReading, Leg
 from dcdrw_control.legs.walk import follow
 
 
@@ -36,6 +37,40 @@ def test_every_heel_strike_is_found_and_the_phase_followed_however_the_sensor_is
     assert score.strikes.close >= STRIKES_GOAL
     assert score.steady <= STEADY_GOAL
     assert score.turning <= TURN_GOAL
+
+
+def sideways(case, strikes):
+    """The walk, turned by a quarter about the vertical until shortly after so many heel strikes."""
+    until = 1e9 * (case.truth[strikes - 1] + 0.2)
+    upwards = np.mean([one.reading.acceleration for one in case.readings[:100]], axis=0)
+    turned = Rotation.from_rotvec(0.5 * math.pi * upwards / np.linalg.norm(upwards))
+    return [
+        one._replace(reading=ImuReading(*(tuple(turned.apply(vector).tolist()) for vector in one.reading)))
+        if one.stamp_ns < until
+        else one
+        for one in case.readings
+    ]
+
+
+@pytest.mark.parametrize('side', SIDES)
+@pytest.mark.parametrize('steps', [1, 2])
+def test_steps_to_the_side_before_the_walk_cost_none_of_its_strikes(side, steps):
+    case = foot(side, 'IMU')
+    found, later = follow(sideways(case, steps)).strike_seconds(case.leg), case.truth[steps:]
+    accuracy = judge_strikes(found[found > later[0] - 0.2], later)
+    assert (accuracy.missed, accuracy.false) == (0, 0)
+    assert accuracy.close >= STRIKES_GOAL
+
+
+@pytest.mark.parametrize('side', SIDES)
+def test_a_sensor_that_slips_leaves_a_gap_and_is_followed_again(side):
+    case = foot(side, 'IMU')
+    walk = follow(sideways(case, 10))
+    found, later = walk.strike_seconds(case.leg), case.truth[20:]
+    accuracy = judge_strikes(found[found > later[0] - 0.2], later)
+    assert (accuracy.missed, accuracy.false) == (0, 0)
+    assert walk.status.legs[case.leg].gaps == 1
+    assert max(np.diff(walk.phase(case.leg)[0])) > 0.1
 
 
 @pytest.mark.parametrize('name', FORCES)
