@@ -41,7 +41,7 @@ from dcdrw_msgs_py.in_step import BAND_PERCENT, HOLD_STEPS, in_step_from, strike
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.rolling import steps_ahead
 from dcdrw_msgs_py.samples import SECOND, JointSample, PhaseSample, Turn
-from dcdrw_sim.map.holding import UNCERTAIN, Law, Method, corners, eased, law, plant, plants_near
+from dcdrw_sim.map.holding import UNCERTAIN, Law, Method, corners, eased, law, plant
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.model.start import start
@@ -139,7 +139,8 @@ def gains(chosen: Law) -> HoldGains:
 @functools.cache
 def hold_law(rig: RigParams, delay: float, method: Method) -> Law:
     """The law as `dcdrw control` computes it."""
-    return eased(law(plant(rig, delay=delay), method), plants_near(rig, UNCERTAIN, delay))
+    about = plant(rig, delay=delay)
+    return eased(law(about, method), about)
 
 
 def controller(task: Task) -> PhaseLaw | Core:

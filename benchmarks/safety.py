@@ -55,7 +55,7 @@ from dcdrw_msgs_py.topics import (
     SYNCHRONIZER_STATE,
     Topic,
 )
-from dcdrw_sim.map.holding import UNCERTAIN, eased, law, plant, plants_near
+from dcdrw_sim.map.holding import eased, law, plant
 from dcdrw_sim.model.dynamics import coupler_force
 from dcdrw_sim.model.start import start
 from dcdrw_sim.motion.trajectory import run
@@ -88,7 +88,8 @@ class Stack:
     """Simulator, estimator and synchronizer as processes, and what is heard of them here."""
 
     def __init__(self, rig: RigParams, **simulator: Any) -> None:
-        chosen = eased(law(plant(rig)), plants_near(rig, UNCERTAIN))
+        about = plant(rig)
+        chosen = eased(law(about), about)
         self.rig = rig.resolved()
         self._parameters: dict[str, dict[str, Any]] = {
             SIMULATOR.name: simulator,

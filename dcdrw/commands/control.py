@@ -15,7 +15,7 @@ from dcdrw_control.sync.safety import Limits
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.yaml_file import yaml_text
-from dcdrw_sim.map.holding import METHODS, TARGETS, UNCERTAIN, Margins, eased, law, margins, plant, plants_near
+from dcdrw_sim.map.holding import METHODS, TARGETS, UNCERTAIN, Margins, eased, law, margins, plant
 from dcdrw_sim.map.return_map import Complexes
 from dcdrw_tracker.gait.sync import SyncParams
 
@@ -115,8 +115,7 @@ def _hold(rig: RigParams, options: argparse.Namespace) -> _Found:
     damped = rig._replace(b=rig.b + options.damping)
     about = plant(damped, options.target, options.delay, options.max_force)
     chosen = law(about, options.method, 0.01 * SyncParams().band_percent, options.max_force)
-    if options.uncertain:
-        chosen = eased(chosen, plants_near(damped, 0.01 * options.uncertain, options.delay))
+    chosen = eased(chosen, about, 0.01 * options.uncertain)
     state = chosen.state
     report = [
         f'aim           θ2 = {math.degrees(state.theta2):.3f}°, θ1′ = {state.omega1:.4f} rad/s, '

@@ -7,7 +7,7 @@ The law is u = u* − K x − κ (u_before − u*).
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Literal, NamedTuple, get_args
 
@@ -151,16 +151,18 @@ def plants_near(rig: RigParams, share: float, delay: float = 0.0) -> list[Plant]
     return found
 
 
-def eased(chosen: Law, plants: Sequence[Plant]) -> Law:
-    """A law with so much less gain that the worst of several rigs is damped best.
+def eased(chosen: Law, about: Plant, share: float = UNCERTAIN) -> Law:
+    """A law with so much less gain that the worst of the rigs near its plant's is damped best.
 
     A loop's largest multiplier is left aside: it is that of the pair's own speed, which a held force hardly moves.
 
     Args:
         chosen: the law.
-        plants: one for each rig; where there is none, the law stays as it is.
+        about: its plant.
+        share: how far masses, damping and stiffness may each be off; where it is 0, the law stays as it is.
 
     """
+    plants = plants_near(about.rig, share, about.delay) if share else []
     if not plants:
         return chosen
 

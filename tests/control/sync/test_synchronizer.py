@@ -13,7 +13,7 @@ from dcdrw_control.sync.synchronizer import Synchronizer, SynchronizerParams
 from dcdrw_msgs_py.quantity import check
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.samples import JointSample, PhaseSample, Turn
-from dcdrw_sim.map.holding import Law, corners, eased, law, plant, plants_near
+from dcdrw_sim.map.holding import Law, corners, eased, law, plant
 from dcdrw_sim.model.presets import preset
 from dcdrw_sim.model.scaling import nondimensional
 from dcdrw_sim.model.start import start
@@ -83,7 +83,8 @@ def test_on_its_limit_cycle_the_pair_needs_no_force():
 def test_a_rig_that_is_not_the_one_that_was_told_comes_into_step_all_the_same(corner, percent):
     """Masses, b and k each 30 % less or more: its swing lies about 50 % elsewhere, and the aim goes there."""
     rig = corners(PAPER.resolved(), 0.3)[corner]
-    params = SynchronizerParams(law='hold', hold=gains_of(eased(law(plant(PAPER)), plants_near(PAPER.resolved(), 0.3))))
+    about = plant(PAPER)
+    params = SynchronizerParams(law='hold', hold=gains_of(eased(law(about), about)))
     rows = list(walk(rig, params, percent / 100.0, 15.0))
     assert steps(rows) <= (0 if percent == 50 else 5)
     assert max(abs(force) for _, _, force, _, _ in rows[-round(3.0 * RATE) :]) < 0.2

@@ -58,13 +58,14 @@ def test_the_loop_is_stable_up_to_its_margins_and_not_beyond(method):
 
 @pytest.mark.parametrize('delay', [0.0, 0.05])
 def test_an_eased_law_damps_the_worst_of_its_rigs_better(delay):
-    chosen, rigs = law(plant(PAPER, delay=delay)), plants_near(PAPER, 0.3, delay)
+    about = plant(PAPER, delay=delay)
+    chosen, rigs = law(about), plants_near(PAPER, 0.3, delay)
     assert len(rigs) == 8
-    milder = eased(chosen, rigs)
+    milder = eased(chosen, about, 0.3)
     worst, before = (max(abs(rig.closed(one)[1]) for rig in rigs) for one in (milder, chosen))
     assert worst < 0.37 < 0.5 < before
     assert np.array(milder.gain) / chosen.gain == pytest.approx([milder.gain[1] / chosen.gain[1]] * 3)
-    assert eased(chosen, []) == chosen
+    assert eased(chosen, about, 0.0) == chosen
 
 
 def test_the_middle_of_the_papers_swing_is_that_of_its_extremes():
