@@ -33,6 +33,7 @@ from dcdrw_msgs_py.topics import (
     REAR_STANCE,
     REAR_STEPS,
     REAR_WHEEL,
+    RESOLUTION_JOINT,
     RESTARTS,
     SLOPE_FRAME,
     SOURCES_JOINT,
@@ -152,7 +153,7 @@ class PhaseSampleReader:
     def __init__(self) -> None:
         self._joints = Joints(
             (FRONT_STANCE, REAR_STANCE, PHI_JOINT, STEP_DIFFERENCE_JOINT),
-            (FRONT_STEPS, REAR_STEPS, RESTARTS, SOURCES_JOINT),
+            (FRONT_STEPS, REAR_STEPS, RESTARTS, SOURCES_JOINT, RESOLUTION_JOINT),
         )
 
     def read(self, message: Any) -> PhaseSample:
@@ -162,7 +163,7 @@ class PhaseSampleReader:
             ValueError: as `Joints.read`, or a step difference that is not a number.
 
         """
-        front, rear, phi, (difference, *_), *counts = self._joints.read(message)
+        front, rear, phi, (difference, *_), *counts, (resolution, *_) = self._joints.read(message)
         steps1, steps2, restarts, sources = (round(count) if math.isfinite(count) else 0 for count, *_ in counts)
         if not math.isfinite(difference):
             raise ValueError(f'{STEP_DIFFERENCE_JOINT} must be a number, got {difference}')
@@ -176,6 +177,7 @@ class PhaseSampleReader:
             steps1,
             steps2,
             max(sources, 1),
+            resolution if resolution > 0.0 else 0.0,
         )
 
 
@@ -209,23 +211,22 @@ class PhaseSampleWriter:
 
     def __init__(self) -> None:
         names = [FRONT_STANCE, REAR_STANCE, PHI_JOINT, STEP_DIFFERENCE_JOINT, FRONT_STEPS, REAR_STEPS, RESTARTS]
-        self._message, self._contested = JointState(name=names), JointState(name=[*names, SOURCES_JOINT])
+        self._message, self._longer = JointState(name=names), JointState(name=[*names, SOURCES_JOINT, RESOLUTION_JOINT])
 
     def write(self, sample: PhaseSample) -> Any:
         """The message of a sample; valid until the next call."""
-        message, (_, front, rear, phi, difference, restarts, steps1, steps2, sources) = self._message, sample
+        message = self._message
+        _, front, rear, phi, difference, restarts, steps1, steps2, sources, resolution = sample
         message.header.stamp = to_stamp(sample.stamp_ns)
         message.position = array('d', (front.angle, rear.angle, phi.angle, difference, steps1, steps2, restarts))
         message.velocity = array('d', (front.rate, rear.rate, phi.rate, 0.0, 0.0, 0.0, 0.0))
-        if sources == 1:
+        if sources == 1 and not resolution:
             return message
-        contested = self._contested
-        contested.header.stamp = message.header.stamp
-        contested.position, contested.velocity = message.position + array('d', (sources,)), message.velocity + _ZERO
-        return contested
-
-
-_ZERO = array('d', (0.0,))
+        longer = self._longer
+        longer.header.stamp = message.header.stamp
+        longer.position = message.position + array('d', (sources, resolution))
+        longer.velocity = message.velocity + array('d', (0.0, 0.0))
+        return longer
 
 
 def run_message(stamp: int, number: int) -> Any:

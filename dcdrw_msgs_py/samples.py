@@ -112,6 +112,8 @@ class PhaseSample(NamedTuple):
     """n2."""
     sources: int = 1
     """How many nodes send the joint states of these wheels, where one should."""
+    resolution: float = 0.0
+    """How far coarse encoders leave the phase open, a count of each, in steps; 0 where rotations are told finely."""
 
 
 class Footfall(NamedTuple):

@@ -156,6 +156,8 @@ FRONT_STANCE, REAR_STANCE, PHI_JOINT, STEP_DIFFERENCE_JOINT = 'front_stance', 'r
 FRONT_STEPS, REAR_STEPS, RESTARTS = 'front_steps', 'rear_steps', 'restarts'
 SOURCES_JOINT = 'sources'
 """Only where several nodes send the joint states of the same wheels: how many."""
+RESOLUTION_JOINT = 'resolution'
+"""Only where encoders are coarse: how far their counts leave the phase open, in steps."""
 # Names of the joints in sync_state.
 PHASE_JOINT, SYNC_ERROR_JOINT = 'phase', 'sync_error'
 SLOPE_FRAME = 'slope'

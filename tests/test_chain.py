@@ -1,5 +1,6 @@
 """The whole chain in three processes."""
 
+import math
 import signal
 from functools import partial
 from itertools import pairwise
@@ -8,12 +9,22 @@ import pytest
 from std_srvs.srv import SetBool
 
 from dcdrw_msgs_py.diagnosis import SOURCES, Level, PairState, SourceState
-from dcdrw_msgs_py.messages import PhaseSampleReader, diagnoses, footfall
+from dcdrw_msgs_py.messages import JointSampleWriter, PhaseSampleReader, diagnoses, footfall
 from dcdrw_msgs_py.rig import RigParams
-from dcdrw_msgs_py.topics import DIAGNOSTICS, FOOTFALLS, PHASE_STATE, SYNC_ERROR_PERCENT, SYNC_STATE, SYNCHRONIZED
+from dcdrw_msgs_py.samples import JointSample, Turn
+from dcdrw_msgs_py.topics import (
+    DIAGNOSTICS,
+    FOOTFALLS,
+    JOINT_STATES,
+    PHASE_STATE,
+    SYNC_ERROR_PERCENT,
+    SYNC_STATE,
+    SYNCHRONIZED,
+)
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatorParams
 from tests.bench import PATIENCE, Bench
+from tests.tracker.walking import START_NS, walk
 
 pytestmark = pytest.mark.processes
 
@@ -118,6 +129,24 @@ def test_two_sources_are_named_by_estimator_and_monitor(bench):
 
     for name in ('phase_estimator', 'sync_monitor'):
         bench.wait(partial(warned, name), f'a warning of {name} that names both')
+
+
+def test_a_monitor_warns_of_encoders_too_coarse_for_its_band(bench):
+    diagnostics = bench.hear(DIAGNOSTICS)
+    for name in ('sync_monitor', 'phase_estimator'):
+        bench.start(name)
+    publisher, writer, count = bench.publisher(JOINT_STATES), JointSampleWriter(), math.tau / 64
+    walked = iter(walk(40.0, 100.0).samples())
+    start_ns = bench.node.get_clock().now().nanoseconds
+
+    def warned() -> bool:
+        sample = next(walked)
+        turns = [Turn(count * math.floor(turn.angle / count)) for turn in sample[1:3]]
+        publisher.publish(writer.write(JointSample(start_ns + sample.stamp_ns - START_NS, *turns)))
+        said = [diagnosis for message in diagnostics if (diagnosis := diagnoses(message).get('sync_monitor'))]
+        return any(each.level == Level.WARN and 'too coarse for the band' in each.message for each in said)
+
+    bench.wait(warned, 'a warning of the monitor')
 
 
 def test_wheels_are_held_before_they_are_let_go_and_while_they_are_paused_but_never_stalled(bench):

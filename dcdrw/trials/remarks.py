@@ -7,7 +7,7 @@ from typing import NamedTuple
 from dcdrw.trials.analysis import Analysis, Resumption
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND
-from dcdrw_tracker.gait.diagnostics import HINTS, REFUSALS
+from dcdrw_tracker.gait.diagnostics import HINTS, REFUSALS, coarseness
 from dcdrw_tracker.gait.phase import Restart
 
 MANY_DISBELIEVED = 0.1
@@ -31,7 +31,9 @@ def remarks(trial: Analysis) -> tuple[Remark, ...]:
 def _remarks(trial: Analysis) -> Iterator[Remark]:
     estimator, cadence = trial.estimator, trial.cadence
     for hint in estimator.hints:
-        yield Remark(f'{HINTS[hint][0].upper()}{HINTS[hint][1:]}.', True)
+        yield Remark(_as_sentence(HINTS[hint]), True)
+    if trial.status.too_coarse:
+        yield Remark(_as_sentence(coarseness(trial.status)), True)
     if trial.resumed:
         yield Remark(f'{_begun_anew(trial, trial.resumed)}; what came before is left out.', True)
     refused = sum(estimator.refusals.values())
@@ -68,6 +70,10 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         yield Remark(
             f'The counter of an encoder rolled over {_number_of(estimator.rollovers, "time")}, which is made good.'
         )
+
+
+def _as_sentence(words: str) -> str:
+    return f'{words[0].upper()}{words[1:]}.'
 
 
 def _begun_anew(trial: Analysis, resumed: Resumption) -> str:

@@ -59,6 +59,8 @@ class Summary(NamedTuple):
     band_percent: float
     final_band_percent: tuple[float | None, float | None]
     """Least and greatest error over the last steps."""
+    resolution_percent: float
+    """How far coarse encoders leave the error open, a count of each; 0 where the rotations are told finely."""
     final_phi_deg: tuple[float | None, float | None]
     contraction_per_step: float | None
     error_percent_per_step: tuple[float | None, ...]
@@ -96,6 +98,7 @@ def summarize(trial: Analysis) -> Summary:
         steps_to_synchronization=status.steps_to_synchronization if synchronized else None,
         band_percent=trial.params.sync.band_percent,
         final_band_percent=(_known(low), _known(high)),
+        resolution_percent=status.resolution_percent,
         final_phi_deg=(_known(_degrees(low, trial)), _known(_degrees(high, trial))),
         contraction_per_step=_known(status.contraction),
         error_percent_per_step=tuple(map(_known, status.history)),

@@ -42,11 +42,14 @@ def diagnose_sync(status: SyncStatus, age: float, stale_after: float) -> Diagnos
 
     """
     state = judge(status, age <= stale_after)
+    level, message = _LEVELS.get(state, Level.OK), _message(state, status, age)
+    if status.too_coarse and state is not PairState.NO_DATA:
+        level, message = max(level, Level.WARN), f'{message}; {coarseness(status)}'
     low, high = status.swing_percent
     steps = status.steps_to_synchronization
     return Diagnosis(
-        _LEVELS.get(state, Level.OK),
-        _message(state, status, age),
+        level,
+        message,
         {
             STATE: state,
             PHASE: 100.0 * status.phase,
@@ -60,6 +63,7 @@ def diagnose_sync(status: SyncStatus, age: float, stale_after: float) -> Diagnos
             STEPS_TO_SYNCHRONIZATION: math.nan if steps is None else steps,
             'initial phase [%]': 100.0 * status.initial_phase,
             CONTRACTION: status.contraction,
+            'resolution of the error [%]': status.resolution_percent,
             'slipped steps': status.slips,
             'times synchronization was lost': status.losses,
             RESTARTS: status.restarts,
@@ -100,6 +104,14 @@ _LEVELS = {
     PairState.LOST: Level.WARN,
 }
 """The level and message of each state that is not OK."""
+
+
+def coarseness(status: SyncStatus) -> str:
+    """What is said of rotations that are told too coarsely for the band."""
+    return (
+        f'the encoders are too coarse for the band: a count of each leaves {status.resolution_percent:.3g} % of a step '
+        'open (more counts in a turn would tell)'
+    )
 
 
 def phase_text(phase: float) -> str:

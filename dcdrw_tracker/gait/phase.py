@@ -14,6 +14,7 @@ from dcdrw_msgs_py.rolling import default_stance_distance, phase, phi_pitch, ste
 from dcdrw_msgs_py.samples import Footfall, JointSample, PhaseSample, Turn
 from dcdrw_msgs_py.topics import COUPLER, FRONT_WHEEL, REAR_WHEEL
 from dcdrw_tracker.gait.cadence import Cadence, CadenceStatus
+from dcdrw_tracker.gait.resolution import Resolution
 from dcdrw_tracker.gait.rotation import Rotation, Strike, Tolerance
 
 Refusal = Literal['unreadable', 'unpaired', 'not finite', 'repeated', 'reversed', 'future', 'outlier']
@@ -180,6 +181,7 @@ class PhaseEstimator:
         self._restarts = self._rolled_before = 0
         self._restarted: deque[Restart] = deque(maxlen=REMEMBERED)
         self._clock_steps: deque[ClockStep] = deque(maxlen=REMEMBERED)
+        self._is_fine = True
         self.reset()
 
     def configure(self, params: PhaseParams) -> None:
@@ -196,6 +198,10 @@ class PhaseEstimator:
         self._clock_ns = self._arrived_ns = 0
         self._front = self._rear = Rotation(self.params.front.alpha, 0, 0.0, math.nan, self._tolerance)
         self._n_uncertain = False
+        if self._is_fine:  # what starts may have other encoders; one whose counts seem to be jumps is learned on
+            self._is_fine, self._resolution = False, 0.0
+            self._front_resolution, self._rear_resolution = Resolution(), Resolution()
+            self._seen: JointSample | None = None
 
     def refuse(self, why: Refusal, samples: int = 1) -> None:
         """Count samples that are of no use; callers report what they cannot even convert (`unreadable`)."""
@@ -236,6 +242,8 @@ class PhaseEstimator:
         if self._clock_ns:
             stamp_ns -= self._clock_ns
             joints = joints._replace(stamp_ns=stamp_ns)
+        if not self._is_fine:
+            self._resolve(joints)
         last = self._last
         if last is None:
             self._cadence.tick(stamp_ns)
@@ -285,6 +293,18 @@ class PhaseEstimator:
             restarted=tuple(self._restarted),
             hints=self._hints(),
         )
+
+    def _resolve(self, joints: JointSample) -> None:
+        """Learn how finely the rotations are told, also from samples that are refused."""
+        last, self._seen = self._seen, joints
+        dt = (joints.stamp_ns - last.stamp_ns) * 1e-9 if last else 0.0
+        if last is None or dt <= 0.0:
+            return
+        front, rear = self._front_resolution, self._rear_resolution
+        front.take(joints.front.angle - last.front.angle, dt)
+        rear.take(joints.rear.angle - last.rear.angle, dt)
+        self._is_fine = front.is_fine and rear.is_fine
+        self._resolution = 0.5 * (front.count / self.params.front.alpha + rear.count / self.params.rear.alpha)
 
     def _hints(self) -> tuple[Hint, ...]:
         hints: list[Hint] = []
@@ -392,6 +412,7 @@ class PhaseEstimator:
             self._restarts,
             front.steps,
             rear.steps,
+            resolution=self._resolution,
         )
 
     def _hold(self, joints: JointSample, why: Refusal, arrival_ns: int) -> PhaseUpdate | None:

@@ -5,6 +5,7 @@ from collections import deque
 from typing import NamedTuple
 
 from dcdrw_msgs_py.rolling import stance
+from dcdrw_tracker.gait.resolution import common_divisor
 
 PACE_MEMORY = 1.0
 """Time over which the mean speed is taken [s]."""
@@ -212,7 +213,7 @@ class Rotation:
             self._wraps = False
         if turned and self._unlearned:
             self._unlearned -= 1
-            self._count = _common_divisor(self._count, abs(turned))
+            self._count = common_divisor(self._count, abs(turned), LEAST_COUNT)
         strikes = self._strikes(elapsed_ns, psi, tolerance.hysteresis)
         memory = dt if dt > PACE_MEMORY else PACE_MEMORY
         self.pace += (moved - self.pace * dt) / memory
@@ -272,14 +273,3 @@ class Rotation:
                     break
         past.append((stamp_ns, psi))
         return slope
-
-
-def _common_divisor(one: float, other: float) -> float:
-    """The largest angle of which both are multiples; 0 where it is less than `LEAST_COUNT`."""
-    if math.isinf(one):
-        return other
-    if not one:
-        return 0.0
-    while other > 0.1 * LEAST_COUNT:
-        one, other = other, abs(math.remainder(one, other))
-    return one if one > LEAST_COUNT else 0.0

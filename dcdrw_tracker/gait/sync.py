@@ -104,6 +104,10 @@ class SyncStatus(NamedTuple):
     """Was synchronized, and is no longer."""
     stalled: tuple[str, ...] = ()
     """The wheels that have stalled."""
+    resolution_percent: float = 0.0
+    """How far coarse encoders leave the error open, a count of each [%]; 0 where the rotations are told finely."""
+    too_coarse: bool = False
+    """That is as much as the band: the error may seem to be outside or inside where it is not."""
     restarts: int = 0
     """How often the source has started anew."""
     cadence: CadenceStatus = CadenceStatus(math.nan, 0, 0, 0.0)
@@ -202,6 +206,7 @@ class SyncMonitor:
         last = self._last
         if last is None:
             return SyncStatus(restarts=self._restarts, cadence=self._cadence.status())
+        resolution = round(100.0 * last.resolution, 6)
         return SyncStatus(
             stamp_ns=last.stamp_ns,
             phase=0.5 + self._error / 100.0,
@@ -222,6 +227,8 @@ class SyncMonitor:
             losses=self._losses,
             lost=self._lost,
             stalled=self._stalled(last.stamp_ns),
+            resolution_percent=resolution,
+            too_coarse=resolution >= self.params.band_percent,
             restarts=self._restarts,
             cadence=self._cadence.status(),
         )

@@ -53,7 +53,19 @@ counts = st.integers(-1000, 1000)
 
 
 @given(
-    st.builds(PhaseSample, stamps, turns, turns, turns, counts, st.integers(0, 1000), counts, counts, st.integers(1, 9))
+    st.builds(
+        PhaseSample,
+        stamps,
+        turns,
+        turns,
+        turns,
+        counts,
+        st.integers(0, 1000),
+        counts,
+        counts,
+        st.integers(1, 9),
+        st.floats(0.0, 2.0),
+    )
 )
 def test_phase_samples_survive(sample):
     assert PhaseSampleReader().read(PhaseSampleWriter().write(sample)) == sample

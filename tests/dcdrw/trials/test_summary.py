@@ -2,6 +2,7 @@
 
 import json
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.samples import SECOND, JointSample, Turn
 from dcdrw_sim.rig.simulator import SimulatedRig, SimulatorParams
+from dcdrw_tracker.gait.sync import SyncParams
 from tests.tracker.walking import walk
 from tests.trials import batch
 
@@ -27,6 +29,14 @@ def trial(samples: list[JointSample]) -> Analysis:
 
 def later(samples: list[JointSample], seconds: float) -> list[JointSample]:
     return [sample._replace(stamp_ns=sample.stamp_ns + round(seconds * SECOND)) for sample in samples]
+
+
+@cache
+def rolled(rate: int) -> list[JointSample]:
+    """The paper's trial, exactly."""
+    rig = SimulatedRig(RigParams(), SimulatorParams(rate=float(rate)))
+    samples = (rig.read(i / rate, SECOND + i * SECOND // rate) for i in range(26 * rate))
+    return [sample for sample in samples if sample]
 
 
 def held(seconds: float) -> list[JointSample]:
@@ -47,14 +57,43 @@ def test_a_whole_trial_needs_no_remark():
 @pytest.mark.parametrize('gaps', [[(18.172, 18.241), (18.31, 18.483)], [(4.659, 4.78), (6.39, 6.6), (18.31, 18.483)]])
 def test_samples_that_are_missing_leave_the_steps_as_they_are(gaps):
     """Over a gap the phase is foretold badly; that is no noise, for which the band would be wider."""
-    rig = SimulatedRig(RigParams(), SimulatorParams(rate=float(RATE)))
-    samples = [rig.read(i / RATE, SECOND + i * SECOND // RATE) for i in range(26 * RATE)]
-    seen = [
-        sample for i, sample in enumerate(samples) if sample and not any(begin < i / RATE < end for begin, end in gaps)
-    ]
+    samples = rolled(RATE)
+    seen = [sample for i, sample in enumerate(samples) if not any(begin < i / RATE < end for begin, end in gaps)]
     summary = summarize(trial(seen))
     assert summary.samples.lost == len(samples) - len(seen) > 40
     assert summary.steps_to_synchronization == 38
+
+
+@pytest.mark.parametrize('rate', [20, 200, 1000])
+@pytest.mark.parametrize('counts', [12, 32, 64, 100, 200, 256, 360, 400, 512, 720, 1024, 4096, 1 << 16])
+def test_encoders_too_coarse_for_the_band_are_said_and_finer_ones_change_nothing(counts, rate):
+    """A count of both wheels together is as much as the band at 400 counts in a turn."""
+    count = math.tau / counts
+    seen = [
+        sample._replace(
+            front=Turn(count * math.floor(sample.front.angle / count + 0.3)),
+            rear=Turn(count * math.floor(sample.rear.angle / count + 0.8)),
+        )
+        for sample in rolled(rate)
+    ]
+    summary = summarize(trial(seen))
+    coarse = counts <= 400
+    assert summary.complete != coarse
+    assert ('too coarse for the band' in summary.sentence) == coarse
+    assert summary.resolution_percent == pytest.approx(2400.0 / counts if counts <= 4096 else 0.0, abs=1e-3)
+    assert coarse or summary.state is PairState.SYNCHRONIZED
+
+
+def test_what_is_too_coarse_depends_on_the_band():
+    count = math.tau / 720
+    seen = [
+        sample._replace(**{wheel: Turn(count * math.floor(getattr(sample, wheel).angle / count))})
+        for sample in rolled(200)
+        for wheel in ('front',)
+    ]
+    for band, complete in ((6.0, True), (1.7, True), (1.6, False)):
+        params = TrialParams(sync=SyncParams(band_percent=band))
+        assert summarize(analyze([batch(seen)], params)).complete is complete
 
 
 def test_a_trial_that_ends_within_the_band_too_early_is_not_said_to_be_outside():

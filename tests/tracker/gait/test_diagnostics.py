@@ -35,6 +35,8 @@ NEVER = math.inf
         (STATUS._replace(lost=True), 0.0, Level.WARN, PairState.LOST),
         (STATUS._replace(synchronized=True, steps_to_synchronization=7), 0.0, Level.OK, PairState.SYNCHRONIZED),
         (STATUS, 0.0, Level.OK, PairState.CONVERGING),
+        (STATUS._replace(too_coarse=True), 0.0, Level.WARN, PairState.CONVERGING),
+        (STATUS._replace(too_coarse=True), 2.5, Level.STALE, PairState.NO_DATA),
     ],
 )
 def test_each_state_has_its_own_level_and_message(
@@ -52,6 +54,11 @@ def test_a_person_reads_what_is_wrong() -> None:
         (STATUS._replace(slipped=True, step_difference=2), 0.0, 'slipped a step: n = 2'),
         (STATUS._replace(lost=True), 0.0, 'lost synchronization: error -2.0 %'),
         (STATUS._replace(synchronized=True, steps_to_synchronization=7), 0.0, 'synchronized after 7 steps'),
+        (
+            STATUS._replace(too_coarse=True, resolution_percent=37.5),
+            0.0,
+            'converging: error -2.0 %; the encoders are too',
+        ),
     ):
         assert diagnose_sync(status, age, 1.0).message.startswith(message)
 
@@ -71,6 +78,7 @@ def test_the_keys_of_the_contract_are_there_with_bare_numbers_and_the_unit_in_th
         'steps to synchronization': 'nan',
         'initial phase [%]': '21.6',
         'per-step convergence ratio': '0.9',
+        'resolution of the error [%]': '0',
         'slipped steps': '0',
         'times synchronization was lost': '0',
         'restarts of the source': '0',
