@@ -70,6 +70,5 @@ def save(figure: Any, path: Path) -> None:
     """Save a figure as PNG, PDF or SVG, by the ending of the name; words stay words, that they can be edited."""
     from matplotlib import rc_context
 
-    # A long curve in pieces: else the rasterizer's memory grows with its length.
-    with rc_context({'pdf.fonttype': 42, 'svg.fonttype': 'none', 'agg.path.chunksize': 1000}):
+    with rc_context({'pdf.fonttype': 42, 'svg.fonttype': 'none'}):
         figure.savefig(path, dpi=300)
