@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dcdrw.console import add_json, check_json, number, positive, tell, tell_where
+from dcdrw.console import LiveLine, add_json, check_json, number, positive, tell, tell_where
 from dcdrw.drawings.figure_files import add_formats, figure_files, write_figure
 from dcdrw.files import add_force, refuse_existing, to_json, write_text, write_whole
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file, read_uncertainty, write_changed
@@ -126,15 +126,16 @@ def run(options: argparse.Namespace) -> int:
             trials.append(rolling_samples(trial, whole.motion, known.rig, options.begin, options.end))
         except ValueError as error:
             raise ValueError(f'{path}: {error}') from None
-    fit = identify(known, trials, math.radians(options.zero_deg))
-    outcome = Outcome(
-        fit,
-        parameters(fit),
-        combinations(fit),
-        gains(fit),
-        [misfit(fit, trial) for trial in fit.trials],
-        profiles(fit) if options.out else [],
-    )
+    with LiveLine() as line:
+        fit = identify(known, trials, math.radians(options.zero_deg), line.show)
+        outcome = Outcome(
+            fit,
+            parameters(fit),
+            combinations(fit),
+            gains(fit),
+            [misfit(fit, trial) for trial in fit.trials],
+            profiles(fit, line.show) if options.out else [],
+        )
     found = record(options.recordings, outcome)
     tell(options, report(options.recordings, outcome), found)
     if options.out:

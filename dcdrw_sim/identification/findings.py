@@ -10,7 +10,7 @@ import numpy as np
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.rolling import default_rest_length
 from dcdrw_msgs_py.values import Floats
-from dcdrw_sim.identification.fit import OWN, START, Explained, Fit, Problem
+from dcdrw_sim.identification.fit import OWN, START, Explained, Fit, Problem, unheard
 from dcdrw_sim.identification.unknowns import Form, Knowledge, correlation
 from dcdrw_sim.model.start import start
 from dcdrw_sim.model.wheel import kept
@@ -247,12 +247,13 @@ def misfit(fit: Fit, trial: Explained) -> Misfit | None:
     )
 
 
-def profiles(fit: Fit) -> list[Profile]:
-    """The profile of each parameter: all others, and the starts, sought anew with it held."""
+def profiles(fit: Fit, told: Callable[[str], None] = unheard) -> list[Profile]:
+    """The profile of each parameter: all others, and the starts, sought anew with it held; `told` what is done next."""
     found = []
     best = fit.problem.squares(fit.point)
     errors = np.sqrt(np.diag(fit.whole_covariance))
     for index, unknown in enumerate(fit.known.unknowns):
+        told(f'how well {unknown.name} is known ({index + 1} of {len(fit.known.unknowns)}) ...')
         along = fit.whole_covariance[:, index] / errors[index]
         low, high = (bound[index] for bound in fit.known.bounds())
         values, deviances = [fit.coordinates[index]], [0.0]

@@ -6,7 +6,7 @@ differences of trajectories that run side by side, as one ensemble.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -273,7 +273,13 @@ class Fit(NamedTuple):
         return self.known._replace(coordinates=self.coordinates, covariance=self.covariance)
 
 
-def identify(known: Knowledge, trials: Sequence[Samples], zero: float = ZERO) -> Fit:
+def unheard(_: str) -> None:
+    """Who follows the work: nobody."""
+
+
+def identify(
+    known: Knowledge, trials: Sequence[Samples], zero: float = ZERO, told: Callable[[str], None] = unheard
+) -> Fit:
     """The rig that explains trials best, beside what was known of it.
 
     From the first seconds on to the whole, so that a phase that drifts does not lead astray; outliers lose their weight
@@ -283,6 +289,7 @@ def identify(known: Knowledge, trials: Sequence[Samples], zero: float = ZERO) ->
         known: of the rig before.
         trials: at least one.
         zero: to what the zeros of both wheels are known [rad].
+        told: what is done next.
 
     Raises:
         ValueError: the rig is impossible.
@@ -292,7 +299,8 @@ def identify(known: Knowledge, trials: Sequence[Samples], zero: float = ZERO) ->
     owns = [np.append(trial.first_state(), np.zeros(OWN - START)) for trial in trials]
     first = [Problem(known, [trial.until(window) for trial in trials], rough, zero=zero) for window in WINDOWS]
     ends = []
-    for inside in INSIDE:
+    for number, inside in enumerate(INSIDE, 1):
+        told(f'explaining the first {WINDOWS[-1]:g} s, from start {number} of {len(INSIDE)} ...')
         least = known.bounds()[0] + inside * np.sqrt(np.diag(known.covariance))
         x = np.concatenate([np.maximum(known.coordinates, least), *owns])
         for problem in first:
@@ -300,12 +308,15 @@ def identify(known: Knowledge, trials: Sequence[Samples], zero: float = ZERO) ->
         ends.append(x)
     x, window = min(ends, key=first[-1].misfit), 2.0 * WINDOWS[-1]
     while window < max(trial.seconds[-1] for trial in trials):
+        told(f'explaining the first {window:g} s ...')
         x = Problem(known, [trial.until(window) for trial in trials], rough, zero=zero).solve(x)
         window *= 2.0
+    told('explaining all samples ...')
     whole = Problem(known, trials, rough, zero=zero)
     x = whole.solve(x)
     explained = _explained(whole, x)
     used = [~one.outliers for one in explained]
+    told('explaining all samples but outliers ...')
     problem = Problem(known, trials, [one.deviation for one in explained], used, zero)
     x = problem.released(problem.solve(x, robust=False, settled=SETTLED))
     explained = _explained(problem, x)
