@@ -57,8 +57,9 @@ examples:
   dcdrw track trial.mp4 --camera camera.yaml --rig calibrated.yaml --out trials/first
   dcdrw simulate case.json --strikes strikes.json --trajectory motion.csv --rate 200
 
-completion in bash and zsh, with argcomplete installed:
-  eval "$(register-python-argcomplete dcdrw)"
+completion, with argcomplete installed:
+  eval "$(register-python-argcomplete dcdrw)"                bash; in zsh after autoload -U compinit && compinit
+  register-python-argcomplete --shell fish dcdrw | source    fish
 
 nodes, each run by `ros2 run dcdrw NAME`:
 """

@@ -60,6 +60,21 @@ class CommandLine:
 
     def run(self, arguments: Sequence[str]) -> int:
         """Run the command that these arguments name; returns the exit status."""
+        try:
+            try:
+                return self._run(arguments)
+            finally:  # also of --help, which ends by itself
+                if sys.stdout:
+                    sys.stdout.flush()
+        except BrokenPipeError:  # whoever read has seen enough
+            status = 128 + signal.SIGPIPE
+        except OSError as error:  # a full disk
+            print(f'dcdrw: {in_words(error)}', file=sys.stderr)
+            status = 2
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return status
+
+    def _run(self, arguments: Sequence[str]) -> int:
         if '_ARGCOMPLETE' in os.environ:  # the shell asks what could be typed next
             self._complete(os.environ['COMP_LINE'].split())
         chosen = next((argument for argument in arguments if not argument.startswith('-')), None)
@@ -71,14 +86,15 @@ class CommandLine:
         if options.version:
             print(f'dcdrw {_version()}')
             return 0
+        parser = self.commands[chosen] if chosen else self.parser
+        if unknown:
+            mend = _suggestion(unknown[0], parser.option_strings)
+            print(f'{parser.prog}: there is no argument {unknown[0]!r}{mend}', file=sys.stderr)
+            return 2
         if chosen is None:
             self.parser.print_help()
             return 0
         prog: str = options.prog
-        if unknown:
-            known = self.commands[chosen].option_strings
-            print(f'{prog}: there is no argument {unknown[0]!r}{_suggestion(unknown[0], known)}', file=sys.stderr)
-            return 2
         try:
             with _raised_signals():
                 status: int = options.run(options)
@@ -86,9 +102,8 @@ class CommandLine:
         except KeyboardInterrupt as interrupt:
             print(f'{prog}: interrupted', file=sys.stderr)
             return 128 + getattr(interrupt, 'number', signal.SIGINT)
-        except BrokenPipeError:  # whoever read has seen enough
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return 128 + signal.SIGPIPE
+        except BrokenPipeError:
+            raise
         except (ValueError, OSError) as error:
             print(f'{prog}: {in_words(error)}', file=sys.stderr)
             return 2

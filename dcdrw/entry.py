@@ -30,7 +30,11 @@ def run(name: str) -> int:
     """Run an executable; returns its exit status."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _end)
-    status: int = import_module(EXECUTABLES[name]).main()
+    status: int
+    if name != 'dcdrw' and {'-h', '--help'} & set(sys.argv[1:]):
+        status = import_module('dcdrw.suite.node_help').show(name)
+    else:
+        status = import_module(EXECUTABLES[name]).main()
     return status
 
 

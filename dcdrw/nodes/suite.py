@@ -11,11 +11,8 @@ from importlib import import_module
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 
-from dcdrw.suite.executables import EXECUTABLES, PHASE_ESTIMATOR, SYNC_MONITOR, SYNCHRONIZER
+from dcdrw.suite.executables import EXECUTABLES, HOSTED
 from dcdrw_msgs_py.node import run_all, share_process
-
-DEFAULT = (PHASE_ESTIMATOR.name, SYNC_MONITOR.name, SYNCHRONIZER.name)
-"""The nodes that are hosted unasked."""
 
 
 def make_nodes(names: tuple[str, ...]) -> list[Node]:
@@ -46,7 +43,7 @@ def _node_class(module: str) -> type[Node]:
 def main(args: list[str] | None = None) -> int:
     """Run the nodes."""
     arguments = sys.argv if args is None else [sys.argv[0], *args]
-    names = tuple(remove_ros_args(arguments)[1:]) or DEFAULT
+    names = tuple(remove_ros_args(arguments)[1:]) or HOSTED
     return run_all('suite', lambda: make_nodes(names), arguments[1:])
 
 

@@ -164,6 +164,8 @@ XRL_REFERENCE = Executable(
 
 TRIAL = (SIMULATOR, PHASE_ESTIMATOR, SYNC_MONITOR)
 """The nodes of a trial in simulation."""
+HOSTED = (PHASE_ESTIMATOR.name, SYNC_MONITOR.name, SYNCHRONIZER.name)
+"""The nodes that `suite` hosts in one process unasked."""
 EXECUTABLES = (*TRIAL, TAG_TRACKER, LEG_TRACKER, SYNCHRONIZER, XRL_REFERENCE, VIRTUAL_CAMERA, MARKERS, RECORDER)
 
 RECORDED = (

@@ -81,15 +81,21 @@ def _qos(topic: Topic) -> str:
 
 
 def _parameter(field: Field) -> tuple[str, ...]:
-    quantity, default = field.quantity, field.default
-    if isinstance(default, float):
-        shown = quantity.derived if math.isnan(default) else f'{default:.6g}'
-    elif isinstance(default, tuple):
-        shown = f'`{list(default)}`'
-    else:
-        shown = f'`{default}`' if isinstance(default, str) else str(default).lower()
+    quantity, shown = field.quantity, shown_default(field)
+    if isinstance(field.default, str | tuple):
+        shown = f'`{shown}`'
     live = 'changes' if quantity.live else 'fixed'
     return f'`{field.name}`', shown, quantity.unit, quantity.bounds, live, quantity.doc
+
+
+def shown_default(field: Field) -> str:
+    """The default of a parameter, or the rule by which it is derived."""
+    default = field.default
+    if isinstance(default, float):
+        return field.quantity.derived if math.isnan(default) else f'{default:.6g}'
+    if isinstance(default, bool):
+        return str(default).lower()
+    return str(list(default) if isinstance(default, tuple) else default)
 
 
 def main() -> int:

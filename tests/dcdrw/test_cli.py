@@ -131,3 +131,23 @@ def test_the_shell_completes(line, words, tmp_path):
     environment = {'_ARGCOMPLETE': '1', '_ARGCOMPLETE_IFS': '\n', 'COMP_LINE': line, 'COMP_POINT': str(len(line))}
     subprocess.run(['sh', '-c', script], cwd=ROOT, env={**os.environ, **environment, 'COMP_TYPE': '9'}, check=True)
     assert {word.strip() for word in answer.read_text().split('\n')} == words
+
+
+def test_an_option_without_a_command_is_asked_about(capsys):
+    assert main(['--verison']) == 2
+    assert capsys.readouterr().err == "dcdrw: there is no argument '--verison'; did you mean --version?\n"
+
+
+@pytest.mark.parametrize('words', [['--version'], ['urdf']])
+def test_a_reader_that_has_gone_ends_the_command_without_a_word(words):
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run([sys.executable, '-m', 'dcdrw', *words], cwd=ROOT, stdout=writer, stderr=subprocess.PIPE)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (141, b'')
+
+
+def test_a_full_disk_is_told_in_one_line():
+    with open('/dev/full', 'w') as full:
+        done = subprocess.run([sys.executable, '-m', 'dcdrw', 'urdf'], cwd=ROOT, stdout=full, stderr=subprocess.PIPE)
+    assert (done.returncode, done.stderr) == (2, b'dcdrw urdf: no space left on device\n')

@@ -2,7 +2,8 @@
 
 import pytest
 
-from dcdrw.nodes.suite import DEFAULT, make_nodes
+from dcdrw.nodes.suite import make_nodes
+from dcdrw.suite.executables import HOSTED
 from dcdrw_msgs_py.messages import stamp_ns
 from dcdrw_msgs_py.topics import JOINT_STATES, PHASE_STATE, SYNC_STATE, SYNCHRONIZER_STATE
 
@@ -23,7 +24,7 @@ def test_estimator_monitor_and_synchronizer_work_in_one_process(bench):
     listeners = {listener.node_name for listener in bench.node.get_subscriptions_info_by_topic('/phase_state')}
     assert listeners == {'bench'}  # the monitor and the synchronizer are handed the samples directly
     assert states[-1].data == 'disabled'
-    assert {name for name, _ in bench.node.get_node_names_and_namespaces()} >= set(DEFAULT)
+    assert {name for name, _ in bench.node.get_node_names_and_namespaces()} >= set(HOSTED)
 
 
 def test_a_node_that_does_not_exist_is_named():
