@@ -369,7 +369,6 @@ class LiveState:
             'left_out': self._left_out(now),
             'steps': status.steps,
             'errors': [_rounded(error, 2) for error in status.history[-STEPS_SHOWN:]],
-            'entered': status.steps_to_synchronization,
             'ratio': _rounded(status.contraction, 3),
             'nodes': [self._node(name, now) for name in sorted(self._health)],
             'controls': [_control(field, params.rig) for field in CONTROLS.values()],

@@ -46,6 +46,7 @@ TRIAL_COLUMNS: dict[str, Any] = {
     'synchronized': lambda trial: trial.summary.synchronized,
     'initial_phase_percent': lambda trial: 100.0 * trial.analysis.status.initial_phase,
     'steps_to_synchronization': lambda trial: trial.summary.steps_to_synchronization,
+    'steps_to_synchronization_at_latest': lambda trial: trial.summary.steps_to_synchronization_at_latest,
     'final_phase_low_percent': lambda trial: 50.0 + trial.analysis.status.final_band_percent[0],
     'final_phase_high_percent': lambda trial: 50.0 + trial.analysis.status.final_band_percent[1],
     'contraction_per_step': lambda trial: trial.analysis.status.contraction,

@@ -210,9 +210,10 @@ def _draw_phase(axes: Any, course: _Course) -> None:
     axes.plot(
         *course.line(np.degrees(course.motion.phi), step / 2), color=BLACK, linewidth=1.3 * course.fine, label='φ'
     )
-    entered = course.trial.status.steps_to_synchronization
+    status = course.trial.status
+    entered = status.steps_to_synchronization
     for second in [second for second, steps in course.falls(FRONT) if steps == entered][-1:]:
-        axes.axvline(second, color=BAND, linestyle=':', linewidth=1.5, label=f'from step {entered} on')
+        axes.axvline(second, color=BAND, linestyle=':', linewidth=1.5, label=f'from step {status.steps_text} on')
     axes.set_ylim(0.0, step)
     axes.set_ylabel('phase difference φ [°]')
     percent = axes.secondary_yaxis('right', functions=(lambda deg: deg / step * 100, lambda p: p / 100 * step))

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from dcdrw.trials.analysis import Analysis, Resumption
+from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_tracker.gait.diagnostics import HINTS, REFUSALS, coarseness
@@ -49,6 +50,10 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         yield Remark(
             f'By the stamps, {cadence.lost} of {trial.samples + cadence.lost} samples are missing, in '
             f'{_number_of(cadence.gaps, "gap")} of up to {cadence.longest:.3g} s.'
+        )
+    if trial.state is PairState.SYNCHRONIZED and trial.status.steps_at_latest != trial.status.steps_to_synchronization:
+        yield Remark(
+            f'A gap may hide that the error left the band later: in step after {trial.status.steps_text} steps.'
         )
     if estimator.n_uncertain:
         yield Remark('A gap was long enough to hide a step: n may be off.')

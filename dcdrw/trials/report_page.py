@@ -142,13 +142,12 @@ def _table(trials: Sequence[RecordedTrial]) -> str:
     for number, trial in enumerate(trials):
         rig, summary, samples = trial.rig, trial.summary, trial.summary.samples
         low, high = trial.analysis.status.final_band_percent
-        steps = summary.steps_to_synchronization
         ran = trial.analysis.ran
         cells = (
             f'<a href="#trial{number}">{html.escape(trial.name)}</a>',
             _verdict(trial),
             _number(100 * trial.analysis.status.initial_phase, 1) if ran else _UNKNOWN,
-            _UNKNOWN if steps is None else str(steps),
+            trial.analysis.status.steps_text if summary.synchronized else _UNKNOWN,
             f'{_number(50 + low, 1)} to {_number(50 + high, 1)}' if ran else _UNKNOWN,
             _number(100 * trial.analysis.status.contraction, 1),
             _number(50 + trial.decay.limit, 1),

@@ -56,6 +56,8 @@ class Summary(NamedTuple):
     final_phase_percent: float | None
     final_phase_percent_of_stride: float | None
     steps_to_synchronization: int | None
+    steps_to_synchronization_at_latest: int | None
+    """If the error left the band once more in a gap, wherever it may have; the same where no gap hides it."""
     band_percent: float
     final_band_percent: tuple[float | None, float | None]
     """Least and greatest error over the last steps."""
@@ -96,6 +98,7 @@ def summarize(trial: Analysis) -> Summary:
         final_phase_percent=_known(100.0 * status.phase),
         final_phase_percent_of_stride=_known(50.0 * status.phase),
         steps_to_synchronization=status.steps_to_synchronization if synchronized else None,
+        steps_to_synchronization_at_latest=status.steps_at_latest if synchronized else None,
         band_percent=trial.params.sync.band_percent,
         final_band_percent=(_known(low), _known(high)),
         resolution_percent=status.resolution_percent,
@@ -150,7 +153,7 @@ def verdict(trial: Analysis) -> str:
         PairState.SLIPPED: f'A step slipped shortly before the end: {course}, n = {status.step_difference}.',
         PairState.LOST: f'Synchronization was lost: {course}, {where}.',
         PairState.SYNCHRONIZED: f'From {start:.1f} % to within ±{band:g} % of 50 % of a step (25 % of a stride) in '
-        f'{status.steps_to_synchronization} steps; in the last ones {50 + low:.1f} to {50 + high:.1f} %.',
+        f'{status.steps_text} steps; in the last ones {50 + low:.1f} to {50 + high:.1f} %.',
         PairState.CONVERGING: f'Not synchronized: {course}, {where}.',
     }[trial.state]
 

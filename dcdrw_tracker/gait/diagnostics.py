@@ -46,7 +46,7 @@ def diagnose_sync(status: SyncStatus, age: float, stale_after: float) -> Diagnos
     if status.too_coarse and state is not PairState.NO_DATA:
         level, message = max(level, Level.WARN), f'{message}; {coarseness(status)}'
     low, high = status.swing_percent
-    steps = status.steps_to_synchronization
+    steps, latest = status.steps_to_synchronization, status.steps_at_latest
     return Diagnosis(
         level,
         message,
@@ -61,6 +61,7 @@ def diagnose_sync(status: SyncStatus, age: float, stale_after: float) -> Diagnos
             STEP_DIFFERENCE: status.step_difference,
             STEPS: status.steps,
             STEPS_TO_SYNCHRONIZATION: math.nan if steps is None else steps,
+            f'{STEPS_TO_SYNCHRONIZATION}, at the latest': math.nan if latest is None else latest,
             'initial phase [%]': 100.0 * status.initial_phase,
             CONTRACTION: status.contraction,
             'resolution of the error [%]': status.resolution_percent,
@@ -126,7 +127,7 @@ def _message(state: PairState, status: SyncStatus, age: float) -> str:
         PairState.STALLED: f'stalled: the {" and the ".join(status.stalled)} wheel does not strike any more',
         PairState.SLIPPED: f'slipped a step: n = {status.step_difference}',
         PairState.LOST: f'lost synchronization: error {status.error_percent:+.1f} %',
-        PairState.SYNCHRONIZED: f'synchronized after {status.steps_to_synchronization} steps',
+        PairState.SYNCHRONIZED: f'synchronized after {status.steps_text} steps',
         PairState.CONVERGING: f'converging: error {status.error_percent:+.1f} %',
     }[state]
 

@@ -87,6 +87,8 @@ class SyncStatus(NamedTuple):
     synchronized: bool = False
     steps_to_synchronization: int | None = None
     """Strikes of the front wheel up to the one from which on the pair is in step; None while not synchronized."""
+    steps_at_latest: int | None = None
+    """Likewise if the error left the band once more in a gap, wherever it may have; the same where no gap hides it."""
     swing_percent: tuple[float, float] = (math.nan, math.nan)
     """Least and greatest error within the last whole step of the front wheel."""
     final_band_percent: tuple[float, float] = (math.nan, math.nan)
@@ -111,6 +113,12 @@ class SyncStatus(NamedTuple):
     restarts: int = 0
     """How often the source has started anew."""
     cadence: CadenceStatus = CadenceStatus(math.nan, 0, 0, 0.0)
+
+    @property
+    def steps_text(self) -> str:
+        """The steps to synchronization as people read them: from and to where a gap leaves them open."""
+        first, last = self.steps_to_synchronization, self.steps_at_latest
+        return f'{first}' if first == last or last is None else f'{first} to {last}'
 
 
 class SyncMonitor:
@@ -141,7 +149,10 @@ class SyncMonitor:
         self._steps = 0
         self._history: deque[float] = deque(maxlen=HISTORY)
         self._recent: deque[float] = deque(maxlen=WINDOW)
-        self._since = 0
+        self._since = self._latest = 0
+        self._was_seen = True
+        self._seen_swing = -math.inf, math.inf
+        self._fastest = self._last_fastest = 0.0
         self._noise2 = self._watched = 0.0
         self._synchronized = self._lost = False
         self._losses = self._slips = 0
@@ -218,6 +229,7 @@ class SyncMonitor:
             held=self._is_held,
             synchronized=self._synchronized,
             steps_to_synchronization=self._since if self._synchronized else None,
+            steps_at_latest=max(self._since, self._latest) if self._synchronized else None,
             swing_percent=self._last_swing,
             final_band_percent=self._final_band(),
             contraction=self._contraction,
@@ -267,6 +279,10 @@ class SyncMonitor:
         if len(self._history) > 1:  # what came before the first strike was no whole step
             self._swings.append(self._swing)
             del self._swings[: -self.params.hold_steps]
+            if self._was_seen:
+                self._seen_swing = self._swing
+        if self._fastest:
+            self._last_fastest, self._fastest = self._fastest, 0.0
         self._last_swing, self._swing = self._swing, (error, error)
 
     def _take_step_difference(self, n: int) -> None:
@@ -286,13 +302,25 @@ class SyncMonitor:
         edge = params.band_percent
         if self._since <= self._steps:  # a whole step, or more, in the band
             edge += min(params.band_hysteresis_percent, NOISE_SPAN * math.sqrt(self._noise2))
+        is_gap = self._cadence.is_gap(dt)
+        is_blind = is_gap and dt > SMOOTHING  # for so long that rates foretell nothing
+        if is_gap:
+            self._was_seen = False
         if front or rear:
-            foretold = self._cross(last, phase, front, rear, dt, edge)
+            foretold = self._cross(last, phase, front, rear, dt, edge, is_blind)
         else:
             foretold = self._smooth + 50.0 * (last.phi.rate + phase.phi.rate) / self._pitch * dt
-        self._error = error = self._percent(phase.phi.angle)
+        before, self._error = self._error, self._percent(phase.phi.angle)
+        error = self._error
         self._take_swing(error)
-        self._smooth = smooth = self._smoothed(foretold, dt)
+        speed = abs(phase.phi.rate)
+        if speed > self._fastest:
+            self._fastest = speed
+        if is_gap:
+            self._take_gap(before, dt, strikes, edge)
+        elif front:
+            self._was_seen = True
+        self._smooth = smooth = error if is_blind else self._smoothed(foretold, dt, is_gap)
         self._steps = strikes
         self._since = in_step_from(self._since, strikes, smooth, smooth, edge)
         if self._stalled(phase.stamp_ns):
@@ -303,10 +331,21 @@ class SyncMonitor:
             self._synchronized, self._lost = False, True
             self._losses += 1
 
-    def _cross(self, last: PhaseSample, phase: PhaseSample, front: int, rear: int, dt: float, edge: float) -> float:
+    def _take_gap(self, before: float, dt: float, step: int, edge: float) -> None:
+        """How far the error may have gone unseen: as fast as it was of late, and within the last step that was seen."""
+        after = before + math.remainder(self._error - before, 100.0)
+        reach = 50.0 * max(self._fastest, self._last_fastest) / self._pitch * dt
+        low, high = self._seen_swing
+        middle = 0.5 * (before + after)
+        low, high = max(low, middle - reach), min(high, middle + reach)
+        self._latest = in_step_from(self._latest, step, low, high, edge)
+
+    def _cross(
+        self, last: PhaseSample, phase: PhaseSample, front: int, rear: int, dt: float, edge: float, is_blind: bool
+    ) -> float:
         """Take the error at each forward strike between two samples; returns the error foretold for the later one."""
-        one = _Turning.between(last.front, phase.front, front, dt, self._front_alpha)
-        other = _Turning.between(last.rear, phase.rear, rear, dt, self._rear_alpha)
+        one = _Turning.between(last.front, phase.front, front, dt, self._front_alpha, is_blind)
+        other = _Turning.between(last.rear, phase.rear, rear, dt, self._rear_alpha, is_blind)
 
         def error(time: float) -> float:
             return self._smooth + 100.0 * (one.steps(time) - other.steps(time))
@@ -328,12 +367,12 @@ class SyncMonitor:
         if not low <= error <= high:
             self._swing = min(low, error), max(high, error)
 
-    def _smoothed(self, foretold: float, dt: float) -> float:
+    def _smoothed(self, foretold: float, dt: float, is_gap: bool) -> float:
         """The error that its past and rate foretell, drawn towards the new one; the new one where they disagree."""
         surprise = math.remainder(self._error - foretold, 100.0) if math.isfinite(foretold) else math.inf
         if self._is_held or abs(surprise) > SURPRISE:
             return self._error
-        if not self._cadence.is_gap(dt):  # over which rates foretell less
+        if not is_gap:  # over which rates foretell less
             self._watched = min(self._watched + dt, NOISE_MEMORY)
             self._noise2 += (surprise * surprise - self._noise2) * min(dt / self._watched, 1.0)
         return math.remainder(foretold + surprise * dt / (dt + SMOOTHING), 100.0)
@@ -364,10 +403,10 @@ class _Turning(NamedTuple):
     after: float
 
     @classmethod
-    def between(cls, last: Turn, now: Turn, strikes: int, dt: float, alpha: float) -> '_Turning':
-        """Turning between two samples, from both and the strikes between them."""
+    def between(cls, last: Turn, now: Turn, strikes: int, dt: float, alpha: float, is_blind: bool) -> '_Turning':
+        """Turning between two samples, from both and the strikes between them; evenly where speeds tell nothing."""
         pitch, rate = 2.0 * alpha, last.rate
-        if strikes == 1 and 0.0 < rate <= FASTEST and 0.0 <= now.rate <= FASTEST:
+        if strikes == 1 and not is_blind and 0.0 < rate <= FASTEST and 0.0 <= now.rate <= FASTEST:
             return cls(pitch, (min((alpha - last.angle) / rate, dt),), rate, now.rate)
         mean = (now.angle - last.angle + pitch * strikes) / dt
         times = [(alpha - last.angle + pitch * strike) / mean for strike in range(strikes)] if mean > 0.0 else []

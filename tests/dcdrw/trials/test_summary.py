@@ -15,6 +15,7 @@ from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.samples import SECOND, JointSample, Turn
 from dcdrw_sim.rig.simulator import SimulatedRig, SimulatorParams
+from dcdrw_tracker.gait.diagnostics import diagnose_sync
 from dcdrw_tracker.gait.sync import SyncParams
 from tests.tracker.walking import walk
 from tests.trials import batch
@@ -62,6 +63,30 @@ def test_samples_that_are_missing_leave_the_steps_as_they_are(gaps):
     summary = summarize(trial(seen))
     assert summary.samples.lost == len(samples) - len(seen) > 40
     assert summary.steps_to_synchronization == 38
+
+
+@pytest.mark.parametrize('length', [0.06, 0.2, 0.5, 0.8])
+def test_steps_are_left_open_where_a_gap_may_hide_the_last_excursion_and_there_alone(length):
+    certain = 0
+    for begin in np.arange(18.0, 23.0, 0.37).tolist():
+        seen = [sample for i, sample in enumerate(rolled(RATE)) if not begin < i / RATE < begin + length]
+        analysis = trial(seen)
+        summary = summarize(analysis)
+        first, last = summary.steps_to_synchronization, summary.steps_to_synchronization_at_latest
+        assert first <= 38 <= last <= 38 + 3
+        told = f'{first}' if first == last else f'{first} to {last}'
+        assert f'in {told} steps;' in summary.sentence
+        assert diagnose_sync(analysis.status, 0.0, 1.0).message == f'synchronized after {told} steps'
+        assert ('A gap may hide that the error left the band later' in summary.sentence) == (first < last)
+        certain += first == last
+    assert certain >= 7  # of 14
+
+
+def test_an_excursion_that_fell_into_a_gap_is_not_ruled_out():
+    seen = [sample for i, sample in enumerate(rolled(RATE)) if not 21.0 < i / RATE < 21.3]
+    summary = summarize(trial(seen))
+    assert (summary.steps_to_synchronization, summary.steps_to_synchronization_at_latest) == (37, 38)
+    assert 'in 37 to 38 steps;' in summary.sentence
 
 
 @pytest.mark.parametrize('rate', [20, 200, 1000])

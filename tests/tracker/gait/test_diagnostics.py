@@ -76,6 +76,7 @@ def test_the_keys_of_the_contract_are_there_with_bare_numbers_and_the_unit_in_th
         'n': '0',
         'steps': '12',
         'steps to synchronization': 'nan',
+        'steps to synchronization, at the latest': 'nan',
         'initial phase [%]': '21.6',
         'per-step convergence ratio': '0.9',
         'resolution of the error [%]': '0',
