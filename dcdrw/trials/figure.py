@@ -31,8 +31,8 @@ from dcdrw_sim.figures.style import (
 
 SCREEN = 9.0
 """Width on a screen [inch]; on a printed page its letters are of POINTS still."""
-CLOSE = 50
-"""Steps from which on lines and marks are drawn finer, so that they do not run into one another."""
+CLOSE = 10
+"""Steps per inch from which on lines and marks are drawn finer, so that they do not run into one another."""
 MOST_DRAWN = 8192
 """Rows of a motion that are drawn at most: several for each dot of the picture's width."""
 MOST_STANCES = 400
@@ -78,7 +78,7 @@ def trial_figure(trial: Analysis, title: str, width: float = SCREEN) -> Any:
         ValueError: as `draw_trial`.
 
     """
-    course = _Course.of(trial)
+    course = _Course.of(trial, width)
     force_known = bool(np.isfinite(course.motion.coupler_force).any())
     title = _in_lines(title, width)
     height = 4.2 + 0.31 * width if force_known else 3.5 + 0.26 * width
@@ -116,16 +116,19 @@ class _Course(NamedTuple):
     """[s]"""
     pieces: list[tuple[float, float]]
     """Times between which no sample is missing [s]."""
+    width: float
+    """Of the picture [inch]."""
 
     @classmethod
-    def of(cls, trial: Analysis) -> '_Course':
+    def of(cls, trial: Analysis, width: float) -> '_Course':
         motion = trial.motion
         if (np.diff(motion.stamp_ns) <= 0).any():
             motion = motion.rows(motion.restarts == motion.restarts[-1])
         motion = thinned(motion, MOST_DRAWN)
         time = motion.seconds
         edges = pairwise([0, *motion.gaps.tolist(), len(time)])
-        return cls(trial, motion, time, [(time[first], time[last - 1]) for first, last in edges if last > first])
+        pieces = [(time[first], time[last - 1]) for first, last in edges if last > first]
+        return cls(trial, motion, time, pieces, width)
 
     @property
     def bars(self) -> list[tuple[float, float]]:
@@ -140,7 +143,7 @@ class _Course(NamedTuple):
     @property
     def fine(self) -> float:
         """What lines and marks of steps are scaled by."""
-        return min(1.0, max(CLOSE / max(self.trial.status.steps, 1), 0.2))
+        return min(1.0, max(CLOSE * self.width / max(self.trial.status.steps, 1), 0.2))
 
     @property
     def person(self) -> bool:
