@@ -115,10 +115,9 @@ def _finish(
     except ValueError as error:
         print(f'dcdrw track: no picture: {error}', file=sys.stderr)
     tell_where(options, f'Written: {folder}/')
-    if film.complaint:
-        print(f'dcdrw track: {film.complaint}; what came before is kept', file=sys.stderr)
+    if ends := '; '.join(filter(None, ['interrupted' if film.interrupted else '', film.complaint])):
+        print(f'dcdrw track: {ends}; what came before is kept', file=sys.stderr)
     if film.interrupted:
-        print('dcdrw track: interrupted; what came before is kept', file=sys.stderr)
         return interrupted_status(film.interrupted)
     whole = summary.complete and not film.complaint
     return expectation_status(options.expect, [trial.state]) if whole else 1

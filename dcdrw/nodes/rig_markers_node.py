@@ -44,12 +44,13 @@ class RigMarkersNode(Node):
         self._drawn_run = 0
         self._drawings = 0
         self._sample_age, self._drawn_age, self._says_age, self._acts_age = Age(), Age(), Age(), Age()
-        self._person_age = Age()
+        self._legs_age, self._force_age = Age(), Age()
+        self._drawn: set[str] = set()
         publish_diagnosis(self, self._diagnose)
         self.create_timer(1.0 / params.redraw_rate, self._tick, clock=steady_clock())
         listen(self, DIAGNOSTICS, self._on_diagnostics)
         listen(self, PERSON_FORCE, self._on_person_force)
-        listen(self, LEG_PHASES, lambda message: self._person_age.renew())
+        listen(self, LEG_PHASES, lambda message: self._legs_age.renew())
         follow_runs(self, self._reader.runs)
         listen(self, JOINT_STATES, self._on_joints)
 
@@ -58,7 +59,7 @@ class RigMarkersNode(Node):
 
     def _on_person_force(self, message: Any) -> None:
         self._person_force = message.wrench.force.x
-        self._person_age.renew()
+        self._force_age.renew()
 
     def _on_diagnostics(self, message: Any) -> None:
         said = diagnoses(message)
@@ -93,14 +94,16 @@ class RigMarkersNode(Node):
 
     def _draw(self) -> None:
         acts = self._acts if self._acts_age.seconds <= LIFETIME else ''
-        walks = self._person_age.seconds <= LIFETIME
-        if not walks:
-            self._person_force = math.nan
-        person_force = self._person_force if walks else None
+        walks = min(self._legs_age.seconds, self._force_age.seconds) <= LIFETIME
+        force = self._person_force if self._force_age.seconds <= STALE_AFTER else math.nan
+        person_force = force if walks else None
         shapes = self._view.shapes(self._caption(), acts, person_force)
         if not shapes:
             return
         markers = [to_marker(shape, self._header) for shape in shapes]
+        names = {shape.name for shape in shapes}
+        markers += [Marker(header=self._header, ns=name, action=Marker.DELETE) for name in self._drawn - names]
+        self._drawn = names
         if self._drawn_run != self._view.runs:  # what an earlier run, or node, has left behind
             self._drawn_run = self._view.runs
             markers.insert(0, Marker(header=self._header, action=Marker.DELETEALL))

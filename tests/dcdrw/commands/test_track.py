@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from dcdrw.cli import main
+from dcdrw.trials.filmed import TrackedVideo
 from dcdrw_msgs_py.camera import read_camera, write_camera
 from dcdrw_msgs_py.samples import SECOND
 from tests import ROOT
@@ -212,6 +213,29 @@ def test_a_truncated_video_is_told_and_what_came_before_is_kept(film, tmp_path, 
     assert errors.count('\n') == 1
     assert len(rows(tmp_path / 'out' / 'frames.csv')) > 30
     assert 'truncated' in json.loads((tmp_path / 'out' / 'summary.json').read_text())['end']
+
+
+def test_a_truncated_video_that_is_interrupted_as_it_ends_is_told_in_one_line(tmp_path, capsys, monkeypatch):
+    whole = make_film(tmp_path, 'whole.avi')
+    content = whole.read_bytes()
+    whole.write_bytes(content[: len(content) // 2])
+    to_its_end = TrackedVideo.track
+
+    def interrupted(film: TrackedVideo):
+        for number, frame in enumerate(to_its_end(film), 1):
+            yield frame
+            if number == last:
+                os.kill(os.getpid(), signal.SIGINT)
+
+    assert track(whole, tmp_path / 'first') == 1
+    last = len(rows(tmp_path / 'first' / 'frames.csv'))
+    capsys.readouterr()
+    monkeypatch.setattr(TrackedVideo, 'track', interrupted)
+    assert track(whole, tmp_path / 'out') == 130
+    errors = capsys.readouterr().err
+    assert errors.startswith('dcdrw track: interrupted; ')
+    assert 'it is truncated; what came before is kept' in errors
+    assert errors.count('\n') == 1
 
 
 def test_a_hub_that_does_not_travel_is_worth_a_word(film, tmp_path, capsys):

@@ -4,13 +4,15 @@ import time
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
+from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker
 
 from dcdrw_msgs_py.messages import JointSampleWriter, stamp_ns
 from dcdrw_msgs_py.samples import CouplerSample, JointSample, Turn
-from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, RIG_MARKERS
+from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, LEG_PHASES, PERSON_FORCE, RIG_MARKERS
 from tests.bench import Bench
 
 pytestmark = pytest.mark.processes
@@ -149,3 +151,29 @@ def test_the_frame_can_be_made_to_stay(bench):
         return leg.pose.position.x > 1.0
 
     source.until(far, 'the rig away from its frame')
+
+
+def test_a_force_on_the_person_that_is_told_no_more_goes_though_the_legs_go_on(bench):
+    bench.start('rig_markers')
+    drawings, source = bench.hear(RIG_MARKERS), Source(bench)
+    forces, legs = bench.publisher(PERSON_FORCE), bench.publisher(LEG_PHASES)
+    wrench = WrenchStamped()
+    wrench.wrench.force.x = 12.0
+
+    def shown(told: bool) -> bool:
+        legs.publish(JointState())
+        if told:
+            forces.publish(wrench)
+        last = drawings[-1].markers if drawings else []
+        return any(marker.ns == 'person_force' and marker.action == Marker.ADD for marker in last) and (
+            'on the person +12.0 N' in label(drawings[-1])
+        )
+
+    source.until(lambda: shown(True), 'the force')
+    count = len(drawings)
+    source.until(lambda: not shown(False), 'its end')
+    assert 'on the person' not in label(drawings[-1])
+    actions = [
+        marker.action for message in drawings[count:] for marker in message.markers if marker.ns == 'person_force'
+    ]
+    assert actions[-1] == Marker.DELETE
