@@ -1,5 +1,6 @@
 """The suite around any source of joint states: `ros2 launch dcdrw dcdrw.launch.py source:=sim rviz:=true`."""
 
+from argparse import ArgumentTypeError
 from pathlib import Path
 
 from launch import LaunchDescription
@@ -153,12 +154,19 @@ def _actions(context):
     else:
         numbers = {
             name: parse(chosen[name])
-            for name, parse in {'initial_phase_percent': phase_percent, 'real_time_factor': float}.items()
+            for name, parse in {'initial_phase_percent': _phase, 'real_time_factor': float}.items()
             if chosen[name]
         }
         walk = {'person.walks': True} if person else {}
         actions.append(node('simulator', use_sim_time=False, publish_clock=simulated, **numbers, **walk))
     return [*actions, *map(_ends_all, actions)] if chosen['on_exit'] == 'end' else actions
+
+
+def _phase(text):
+    try:
+        return phase_percent(text)
+    except ArgumentTypeError as error:
+        raise ValueError(f'initial_phase_percent {error}') from None
 
 
 def _ends_all(action):
