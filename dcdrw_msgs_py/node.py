@@ -45,6 +45,10 @@ LEASE_SECONDS = 1.0
 """The liveliness that a latched topic offers: who asks for as much is told when its publisher is gone [s]."""
 TWIN_SECONDS = 0.2
 """A terminal and `ros2 launch` both pass on one Ctrl-C: a second signal this soon is the same one [s]."""
+BURST_SECONDS = 4.0
+"""Who has to miss nothing falls behind for so long in a burst, of a source that catches up, before it drops any [s]."""
+BURST_DEPTH = 4 * SAMPLE_DEPTH
+"""So many samples of such a burst wait at most: 3 s at 1 kHz, and what comes meanwhile."""
 OLD, FRESH = 0.25, 0.05
 """Messages older than the first are too old to hear for long; those younger than the second are heard again [s]."""
 
@@ -230,14 +234,14 @@ class Inbox:
     """Passes messages on while they are fresh.
 
     A subscriber that cannot keep up would hear ever older messages, up to the depth of its queue. Once messages have
-    been older than OLD for longer than that, all that wait are dropped and counted, down to the newest ones. A short
-    stall, or a burst, loses nothing. Where dropping alone takes longer than messages take to come, one is passed on
-    every OLD seconds all the same, so that the subscriber does not take its input for silent.
+    been older than OLD, and ever older, for longer than its patience, all that wait are dropped and counted, down to
+    the newest ones. A short stall, or a burst, loses nothing. Where dropping alone takes longer than messages take to
+    come, one is passed on every OLD seconds all the same, so that the subscriber does not take its input for silent.
     """
 
-    def __init__(self, callback: Callable[[Any], None]) -> None:
-        self._callback = callback
-        self._behind_since = math.inf
+    def __init__(self, callback: Callable[[Any], None], patience: float = OLD) -> None:
+        self._callback, self._patience = callback, patience
+        self._behind_since, self._oldest = math.inf, 0.0
         self._dropping, self._passed_at = False, 0.0
         self.dropped = 0
         """Messages that were dropped so far."""
@@ -253,8 +257,10 @@ class Inbox:
             self._behind_since = math.inf
         else:
             now = time.monotonic()
-            self._behind_since = min(self._behind_since, now)
-            if now - self._behind_since > OLD:
+            if math.isinf(self._behind_since) or age < self._oldest - FRESH:  # it is catching up
+                self._behind_since, self._oldest = now, age
+            self._oldest = max(self._oldest, age)
+            if now - self._behind_since > self._patience:
                 self._dropping, self._behind_since, self._passed_at = True, math.inf, now
         if self._dropping and time.monotonic() - self._passed_at <= OLD:
             self.dropped += 1
@@ -270,6 +276,7 @@ def listen(
     callback: Callable[[Any], None],
     depth: int = SAMPLE_DEPTH,
     take_sample: Callable[[Any], None] | None = None,
+    misses_nothing: bool = False,
 ) -> Any:
     """Subscribe so that reliable and best-effort publishers both match; to a latched topic, as it is published.
 
@@ -283,6 +290,8 @@ def listen(
         depth: so many messages wait at least.
         take_sample: is called in its place with the sample itself, where another node of this process hands samples
             over (`Outlet.publish_sample`).
+        misses_nothing: whether a burst of BURST_DEPTH messages is worked off, though it grows old, where a subscriber
+            that shows or acts upon the newest message alone drops what is old.
 
     """
     outlets = _outlets.get(node.resolve_topic_name(topic.name)) if _outlets else None
@@ -295,8 +304,10 @@ def listen(
             depth=topic.depth, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
         )
         return node.create_subscription(message_type(topic), topic.name, callback, qos)
-    qos = QoSProfile(depth=max(topic.depth, depth), reliability=ReliabilityPolicy.BEST_EFFORT)
-    return node.create_subscription(message_type(topic), topic.name, Inbox(callback).__call__, qos)
+    depth = max(topic.depth, depth, BURST_DEPTH if misses_nothing else 0)
+    qos = QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
+    inbox = Inbox(callback, BURST_SECONDS if misses_nothing else OLD)
+    return node.create_subscription(message_type(topic), topic.name, inbox.__call__, qos)
 
 
 def listen_aged(

@@ -41,7 +41,7 @@ class PhaseEstimatorNode(Node):
         self._age = Age()
         publish_diagnosis(self, self._diagnose)
         follow_runs(self, self._reader.runs)
-        listen(self, JOINT_STATES, self._on_joints)
+        listen(self, JOINT_STATES, self._on_joints, misses_nothing=True)
         self.get_logger().info(f'waiting for the joints {params.front_joint} and {params.rear_joint}')
 
     def _on_joints(self, message: Any) -> None:

@@ -48,7 +48,7 @@ class SyncMonitorNode(Node):
         self._tell(False)
         self._report = publish_diagnosis(self, self._diagnose)
         self.create_timer(WATCH_SECONDS, self._watch, clock=steady_clock())
-        listen(self, PHASE_STATE, self._on_message, take_sample=self._on_phase)
+        listen(self, PHASE_STATE, self._on_message, take_sample=self._on_phase, misses_nothing=True)
 
     def _on_message(self, message: Any) -> None:
         try:

@@ -13,7 +13,18 @@ from std_srvs.srv import Trigger
 from dcdrw.suite.processes import free_domain
 from dcdrw_msgs_py import node as nodes
 from dcdrw_msgs_py.executor import StreamExecutor
-from dcdrw_msgs_py.node import FRESH, OLD, Inbox, advertise, dropped, listen, share_process, steady_clock
+from dcdrw_msgs_py.node import (
+    BURST_DEPTH,
+    BURST_SECONDS,
+    FRESH,
+    OLD,
+    Inbox,
+    advertise,
+    dropped,
+    listen,
+    share_process,
+    steady_clock,
+)
 from dcdrw_msgs_py.topics import DIAGNOSTICS, PHI, SYNCHRONIZED
 
 pytestmark = pytest.mark.processes
@@ -150,7 +161,9 @@ class Clock:
         return self.now
 
 
-def heard_of(monkeypatch: pytest.MonkeyPatch, arrivals: list[float], seconds_each: float) -> tuple[list[float], Inbox]:
+def heard_of(
+    monkeypatch: pytest.MonkeyPatch, arrivals: list[float], seconds_each: float, patience: float = OLD
+) -> tuple[list[float], Inbox]:
     """Ages of the messages that a reader hears which takes so long for each."""
     clock, ages = Clock(), []
     monkeypatch.setattr(nodes, 'time', clock)
@@ -159,7 +172,7 @@ def heard_of(monkeypatch: pytest.MonkeyPatch, arrivals: list[float], seconds_eac
         ages.append(clock.now - arrival)
         clock.now += seconds_each
 
-    inbox = Inbox(hear)
+    inbox = Inbox(hear, patience)
     for arrival in arrivals:
         clock.now = max(clock.now, arrival)
         inbox(arrival, {'received_timestamp': round(arrival * 1e9)})
@@ -189,6 +202,25 @@ def test_a_stall_or_a_burst_that_the_reader_catches_up_with_loses_nothing(monkey
     stall = [1000.0 + 0.001 * i for i in range(1000)]
     assert heard_of(monkeypatch, [*stall, *[1002.0] * 1000], 0.0001)[1].dropped == 0
     assert FRESH < OLD
+
+
+@pytest.mark.parametrize('rate', [1250.0, 1500.0, 2000.0, 3000.0])
+def test_who_has_to_miss_nothing_works_off_the_burst_of_a_source_that_was_stopped_for_three_seconds(monkeypatch, rate):
+    arrivals = [
+        *(1000.0 + i / 1000.0 for i in range(1000)),
+        *(1004.0 + i / 4000.0 for i in range(4000)),
+        *(1005.0 + i / 1000.0 for i in range(12_000)),
+    ]
+    ages, inbox = heard_of(monkeypatch, arrivals, 1.0 / rate, BURST_SECONDS)
+    assert inbox.dropped == 0
+    assert ages[-1] < OLD
+    assert max(ages) * rate < BURST_DEPTH
+
+
+def test_who_has_to_miss_nothing_drops_all_the_same_where_it_never_catches_up(monkeypatch):
+    ages, inbox = heard_of(monkeypatch, [1000.0 + 0.001 * i for i in range(60_000)], 0.002, BURST_SECONDS)
+    assert inbox.dropped > 20_000
+    assert max(ages) < BURST_SECONDS
 
 
 def test_a_node_tells_which_topics_it_dropped_messages_of(pair):

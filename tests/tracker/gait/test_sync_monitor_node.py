@@ -5,6 +5,10 @@ import math
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
+from rclpy.duration import Duration
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Bool
 
 from dcdrw_msgs_py.messages import PhaseSampleWriter
 from dcdrw_msgs_py.samples import PhaseSample, Turn
@@ -106,3 +110,23 @@ def test_band_changes_while_it_runs_and_nonsense_is_refused(bench):
     verdicts = bench.hear(SYNCHRONIZED)
     drive(bench, 0.40, 4 * 52)  # outside the default band, inside the new one
     bench.wait(lambda: verdicts and verdicts[-1].data, 'synchronized by the wider band')
+
+
+def test_who_asks_for_liveliness_learns_that_a_monitor_was_killed_whose_verdict_is_still_true(bench):
+    """The rule of docs/xrl.md: a lease of 2 s."""
+    process = bench.start('sync_monitor')
+    alive, verdicts = [], []
+    qos = QoSProfile(
+        depth=1,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+        liveliness_lease_duration=Duration(seconds=2.0),
+    )
+    events = SubscriptionEventCallbacks(liveliness=lambda event: alive.append(event.alive_count))
+    bench.node.create_subscription(Bool, SYNCHRONIZED.name, verdicts.append, qos, event_callbacks=events)
+    drive(bench, 0.48, 4 * 52)
+    bench.wait(lambda: verdicts and verdicts[-1].data, 'synchronized')
+    bench.wait(lambda: alive and alive[-1] == 1, 'the word that it lives')
+    process.kill()
+    bench.wait(lambda: alive[-1] == 0, 'the word that it does not')
+    assert verdicts[-1].data
