@@ -43,6 +43,14 @@ def test_every_node_and_command_of_the_composition_exists(capsys):
     assert first_arguments('command') <= words
 
 
+def test_the_docs_name_every_argument():
+    for statement in ast.parse(COMPOSITION.read_text(encoding='utf-8')).body:
+        if isinstance(statement, ast.Assign) and statement.targets[0].id == 'ARGUMENTS':
+            names = {key.value for key in statement.value.keys}
+    told = (ROOT / 'docs' / 'tools.md').read_text(encoding='utf-8').split('## Launch files')[1]
+    assert {name for name in names if f'`{name}`' not in told and f'`{name}:=' not in told} == set()
+
+
 @pytest.fixture
 def started():
     launch = pytest.importorskip('launch')
