@@ -18,9 +18,7 @@ from dcdrw.suite.processes import free_domain
 from dcdrw_msgs_py.executor import StreamExecutor
 from dcdrw_msgs_py.node import advertise, message_type
 from dcdrw_msgs_py.topics import Topic
-
-PATIENCE = 60.0
-"""Limit of every wait [s]: for what hangs; on a busy machine discovery alone can take many seconds."""
+from tests.patience import PATIENCE
 
 
 class Bench:

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import settings
 
 from tests import ROOT
+from tests.patience import PATIENCE
 from tests.trials import STIFF
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def live_trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
         cwd=folder,
         env={**os.environ, 'PYTHONPATH': str(ROOT)},
         check=True,
-        timeout=120,
+        timeout=PATIENCE,
         stdout=subprocess.DEVNULL,
     )
     return folder / 'out'

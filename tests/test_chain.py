@@ -23,7 +23,8 @@ from dcdrw_msgs_py.topics import (
 )
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatorParams
-from tests.bench import PATIENCE, Bench
+from tests.bench import Bench
+from tests.patience import PATIENCE
 from tests.tracker.walking import START_NS, walk
 
 pytestmark = pytest.mark.processes

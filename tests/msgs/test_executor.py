@@ -26,9 +26,9 @@ from dcdrw_msgs_py.node import (
     steady_clock,
 )
 from dcdrw_msgs_py.topics import DIAGNOSTICS, PHI, SYNCHRONIZED
+from tests.patience import PATIENCE
 
 pytestmark = pytest.mark.processes
-PATIENCE = 60.0
 
 
 class Pair:

@@ -2,7 +2,6 @@
 
 import math
 import signal
-import time
 
 import pytest
 from sensor_msgs.msg import JointState
@@ -13,6 +12,7 @@ from dcdrw_msgs_py.topics import COUPLER_FORCE_COMMAND, ENABLE, JOINT_STATES, PH
 from dcdrw_sim.map.holding import law, plant
 from dcdrw_sim.model.presets import preset
 from tests.bench import Bench
+from tests.patience import PATIENCE
 
 pytestmark = pytest.mark.processes
 
@@ -51,7 +51,7 @@ class Loop:
             self.enable.publish(Bool(data=enabled))
             return condition()
 
-        self.bench.wait(holds, what, limit=60.0)
+        self.bench.wait(holds, what)
 
     def push(self) -> None:
         """Let it push; on a busy machine a stall may be a fault, which is taken back."""
@@ -141,11 +141,10 @@ def test_an_orderly_end_leaves_zero_and_disabled(bench):
     loop = Loop(bench)
     loop.push()
     bench.end(loop.nodes['synchronizer'])
-    end = time.monotonic() + 20.0
-    bench.wait(lambda: loop.state == 'disabled' and loop.force == 0.0, 'the last words', limit=end - time.monotonic())
+    bench.wait(lambda: loop.state == 'disabled' and loop.force == 0.0, 'the last words')
 
 
 def test_gains_that_nobody_computed_are_refused(bench):
     process = bench.start('synchronizer', law='hold')
-    assert process.wait(30.0) == 2
+    assert process.wait(PATIENCE) == 2
     assert 'dcdrw control' in bench.output('synchronizer')

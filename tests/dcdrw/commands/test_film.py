@@ -24,6 +24,7 @@ from dcdrw_sim.camera.scene import Footing, SceneParams, ViewParams
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatorParams
 from tests import ROOT
+from tests.patience import PATIENCE
 
 pytestmark = pytest.mark.processes
 
@@ -166,14 +167,14 @@ def test_interrupting_keeps_a_valid_film(tmp_path):
         text=True,
         env={**os.environ, 'PYTHONPATH': f'{ROOT}:{os.environ.get("PYTHONPATH", "")}'},
     ) as process:
-        end = time.monotonic() + 60.0
+        end = time.monotonic() + PATIENCE
         while process.poll() is None and not any(path.stat().st_size > 100_000 for path in tmp_path.glob('.c.*.mp4')):
             if time.monotonic() > end:
                 process.kill()
             time.sleep(0.05)
         assert not (tmp_path / 'c.mp4').exists()
         process.send_signal(signal.SIGINT)
-        said, errors = process.communicate(timeout=60.0)
+        said, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     assert '; interrupted. Written: c.mp4' in said
     assert 'Traceback' not in errors

@@ -36,7 +36,7 @@ def replay(bench, *arguments: str) -> subprocess.Popen[str]:
 
 def finish(bench, process) -> str:
     """Wait for its end; return what it printed."""
-    bench.wait(lambda: process.poll() is not None, 'the end of the replay', limit=60)
+    bench.wait(lambda: process.poll() is not None, 'the end of the replay')
     bench.spin(0.5)
     return process.communicate()[0]
 

@@ -13,10 +13,10 @@ import pytest
 from dcdrw.cli import main
 from dcdrw_sim.study.sweep_dataset import open_sweep, sweep_of
 from tests import ROOT
+from tests.patience import PATIENCE
 
 pytestmark = pytest.mark.processes
 
-PATIENCE = 120.0
 QUICK = ['--x', 'k:1e-3:1e-2:2:log', '--y', 'b:0.1:1:3', '--seconds', '30', '--starts', '2']
 LONG = ['--x', 'k:1e-3:1e-2:24:log', '--y', 'b:0.1:0.3:4', '--seconds', '20000', '--starts', '1', '--no-trajectories']
 """Twelve blocks of some tenths of a second each."""

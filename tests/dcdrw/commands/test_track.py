@@ -18,6 +18,7 @@ from dcdrw.trials.filmed import TrackedVideo
 from dcdrw_msgs_py.camera import read_camera, write_camera
 from dcdrw_msgs_py.samples import SECOND
 from tests import ROOT
+from tests.patience import PATIENCE
 
 pytestmark = pytest.mark.processes
 
@@ -181,13 +182,13 @@ def test_interrupting_keeps_what_was_tracked(film, tmp_path):
         text=True,
         env={**os.environ, 'PYTHONPATH': str(ROOT)},
     )
-    end = time.monotonic() + 60.0
+    end = time.monotonic() + PATIENCE
     while process.poll() is None and not any(path.stat().st_size > 500_000 for path in tmp_path.glob('.debug.*.avi')):
         if time.monotonic() > end:
             process.kill()
         time.sleep(0.05)
     process.send_signal(signal.SIGINT)
-    said, errors = process.communicate(timeout=60.0)
+    said, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     assert 'Traceback' not in errors
     assert 'Written: out/' in said

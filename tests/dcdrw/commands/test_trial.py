@@ -22,6 +22,7 @@ from dcdrw_msgs_py.diagnosis import STATE, STEPS_TO_SYNCHRONIZATION, PairState
 from dcdrw_msgs_py.topics import COUPLER_WRENCH, ENABLE, PERSON_FORCE, REAR_TORQUE_COMMAND, SYNCHRONIZER_STATE
 from tests import ROOT
 from tests.children import nodes, runs
+from tests.patience import PATIENCE
 
 pytestmark = pytest.mark.processes
 
@@ -70,7 +71,7 @@ def summary(tmp_path: Path) -> dict:
 
 def test_trial_ends_with_summary_picture_and_sentence(tmp_path):
     process = start(tmp_path, '--initial-phase', '30', '--seconds', '6')
-    output, errors = process.communicate(timeout=60)
+    output, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, errors
     result = summary(tmp_path)
     assert result['end'] == 'complete'
@@ -97,7 +98,7 @@ def test_trial_ends_with_summary_picture_and_sentence(tmp_path):
 def test_a_person_s_trial_is_run_closed_loop_and_tells_the_force_on_the_person(tmp_path):
     rig = '/**:\n  ros__parameters:\n    k: 16\n    b: 10\n    rate: 200\n'
     process = start(tmp_path, '--person', '--seconds', '5', rig=rig)
-    output, errors = process.communicate(timeout=90)
+    output, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, errors
     force = summary(tmp_path)['person_force']
     assert 0.0 < force['rms'] < force['peak'] < 20.0
@@ -118,7 +119,7 @@ def test_no_sentence_is_protocol(tmp_path):
     """Whatever the nodes say to people, a trial starts, ends and is judged by the values beside it."""
     (tmp_path / 'sitecustomize.py').write_text(MUTE)
     process = start(tmp_path, '--initial-phase', '30', '--seconds', '6', path=tmp_path)
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, errors
     result = summary(tmp_path)
     assert {said['message'] for said in result['diagnostics'].values()} == {'?'}
@@ -130,7 +131,7 @@ def test_interrupt_keeps_what_there_is(tmp_path):
     process = start(tmp_path, '--seconds', '600')
     wait_for_motion(process)
     process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=40)
+    _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     assert 'Traceback' not in errors
     assert summary(tmp_path)['end'] == 'interrupted'
@@ -143,7 +144,7 @@ def test_dead_node_ends_the_trial_with_the_reason(tmp_path):
     wait_for_motion(process)
     (node,) = nodes(process.pid, 'phase_estimator')
     os.kill(node, signal.SIGKILL)
-    _, errors = process.communicate(timeout=40)
+    _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
     assert 'phase_estimator was killed by SIGKILL' in errors
     assert summary(tmp_path)['end'].startswith('phase_estimator was killed')
@@ -156,7 +157,7 @@ def test_full_disk_ends_the_trial_and_keeps_what_is_there(tmp_path):
     (node,) = nodes(process.pid, 'recorder')
     size = (tmp_path / 'out' / 'recording' / 'recording_0.mcap').stat().st_size
     resource.prlimit(node, resource.RLIMIT_FSIZE, (size + 100, size + 100))
-    _, errors = process.communicate(timeout=40)
+    _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
     assert 'dcdrw trial: the recording ended: File too large: out/recording; what came before is kept' in errors
     assert summary(tmp_path)['end'].startswith('the recording ended: File too large')
@@ -168,7 +169,7 @@ def test_silence_ends_the_trial_with_the_reason(tmp_path):
     wait_for_motion(process)
     (node,) = nodes(process.pid, 'simulator')
     os.kill(node, signal.SIGSTOP)
-    _, errors = process.communicate(timeout=40)
+    _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
     assert 'no data for 3 s' in errors
     assert summary(tmp_path)['duration_s'] > 0
@@ -181,7 +182,7 @@ def test_nodes_end_with_a_trial_that_is_killed(tmp_path):
     assert len(started) == 4
     process.kill()
     process.communicate()
-    end = time.monotonic() + 10
+    end = time.monotonic() + PATIENCE
     while any(map(runs, started)):
         assert time.monotonic() < end, 'orphans live on'
         time.sleep(0.05)
@@ -190,7 +191,7 @@ def test_nodes_end_with_a_trial_that_is_killed(tmp_path):
 def test_stalled_rig_is_said_to_stall(tmp_path):
     (tmp_path / 'out').mkdir()  # empty: may be used
     process = start(tmp_path, '--seconds', '7', rig=f'{STIFF}    omega1: 0.2\n    omega2: 0.2\n')
-    output, errors = process.communicate(timeout=60)
+    output, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, errors
     assert summary(tmp_path)['stalled'] == ['front', 'rear']
     assert 'stalled after' in output

@@ -12,6 +12,7 @@ from dcdrw.cli import main
 
 pytest.importorskip('cv2')
 from tests import ROOT
+from tests.patience import PATIENCE
 
 pytestmark = pytest.mark.processes
 
@@ -45,7 +46,7 @@ def test_a_filmed_trial_is_the_simulated_one(tmp_path):
         env={**os.environ, 'PYTHONPATH': str(ROOT)},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
         check=False,
     )
     assert done.returncode == 0, done.stderr

@@ -21,9 +21,10 @@ from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.topics import JOINT_STATES, PHASE_STATE, SYNCHRONIZER_STATE
 from dcdrw_msgs_py.topics import SYNCHRONIZED as VERDICT
 from tests import ROOT
-from tests.bench import PATIENCE, Bench
+from tests.bench import Bench
 from tests.children import nodes, runs
 from tests.chromium import Chromium, Tab
+from tests.patience import PATIENCE
 
 pytestmark = pytest.mark.processes
 

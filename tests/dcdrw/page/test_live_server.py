@@ -17,12 +17,12 @@ from dcdrw.cli import main
 from dcdrw.page.live_page import PAGE, PageServer, listen_at
 from dcdrw.page.live_state import read_command
 from tests import ROOT
+from tests.patience import PATIENCE
 
 pytestmark = pytest.mark.processes
 
 TOKEN = 'a-token-of-tests'
 KEPT = 5
-PATIENCE = 60.0
 
 
 class Served:

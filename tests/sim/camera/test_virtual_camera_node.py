@@ -18,6 +18,7 @@ from dcdrw_msgs_py.topics import CAMERA_INFO, DIAGNOSTICS, IMAGE_RAW, JOINT_STAT
 from dcdrw_sim.camera.render import LookParams, Renderer
 from dcdrw_sim.camera.scene import Footing, SceneParams, ViewParams
 from tests import ROOT
+from tests.patience import PATIENCE
 
 pytestmark = pytest.mark.processes
 
@@ -142,7 +143,7 @@ def test_view_and_light_change_while_it_runs_and_impossible_ones_are_refused(ben
 )
 def test_impossible_parameters_end_it_with_one_line(bench, parameters, message):
     process = bench.start('virtual_camera', **parameters)
-    assert process.wait(20.0) == 2
+    assert process.wait(PATIENCE) == 2
     lines = bench.output('virtual_camera').strip().splitlines()
     assert len(lines) == 1
     assert lines[0].startswith('virtual_camera: ')
@@ -157,7 +158,7 @@ def test_without_opencv_it_says_what_to_install(bench, tmp_path):
         text=True,
         check=False,
         cwd=ROOT,
-        timeout=60.0,
+        timeout=PATIENCE,
         env={
             **os.environ,
             'PYTHONPATH': f'{tmp_path}:{os.environ.get("PYTHONPATH", "")}',

@@ -16,6 +16,7 @@ from dcdrw_sim.motion import trajectory
 from dcdrw_sim.motion.ends import BACKWARD, End, MotionError
 from dcdrw_sim.motion.ensemble import run_ensemble
 from tests import ROOT
+from tests.patience import PATIENCE
 from tests.sim.rigs import ALPHA, GENTLE, UNCOUPLED, UNEQUAL, between, rigs, rolling, starts
 
 few = settings(max_examples=25, deadline=None)
@@ -262,7 +263,7 @@ def small_case(*arguments, **environment):
         cwd=ROOT,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
         env={**os.environ, **environment},
         check=False,
     )

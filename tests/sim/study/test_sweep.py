@@ -25,6 +25,7 @@ from dcdrw_sim.study.sweep import (
 from dcdrw_sim.study.sweep_dataset import VARIABLES, open_sweep, sweep_of, to_dataset
 from dcdrw_sim.study.sweep_run import Progress, is_complete, run_sweep
 from dcdrw_sim.study.verdict import Verdict
+from tests.patience import PATIENCE
 
 SMALL = Sweep(preset('paper-sweep'), Axis('k', (1e-4, 1e-3, 1e-2)), Axis('b', (0.1, 0.3, 1.0, 3.0)), 80.0, (0.35, 0.6))
 ALL = (slice(0, 3), slice(0, 4))
@@ -336,11 +337,11 @@ def test_two_processes_do_not_write_one_sweep(tmp_path):
 
     def hold(progress):
         started.set()
-        assert go_on.wait(60.0)
+        assert go_on.wait(PATIENCE)
 
     first = threading.Thread(target=run, args=(SMALL, path, hold))
     first.start()
-    assert started.wait(60.0)
+    assert started.wait(PATIENCE)
     try:
         with pytest.raises(OSError, match='another process is at work in'):
             run(SMALL, path)

@@ -29,6 +29,7 @@ from dcdrw_msgs_py.topics import (
     TAG_DETECTIONS,
 )
 from tests.bench import Bench
+from tests.patience import PATIENCE
 
 pytestmark = pytest.mark.processes
 
@@ -261,7 +262,7 @@ def test_a_camera_that_is_not_there_is_looked_for(bench):
 )
 def test_what_cannot_work_ends_it_with_one_line(bench, settings, message):
     process = bench.start('tag_tracker', **settings)
-    assert process.wait(20.0) == 2
+    assert process.wait(PATIENCE) == 2
     (line,) = bench.output('tag_tracker').splitlines()
     assert line.startswith(f'tag_tracker: {message}')
 
