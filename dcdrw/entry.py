@@ -35,6 +35,10 @@ def run(name: str) -> int:
         status = import_module('dcdrw.suite.node_help').show(name)
     else:
         status = import_module(EXECUTABLES[name]).main()
+    if status > 128:  # ended by a signal: a compiler that was broken off can crash when the interpreter is taken down
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
     return status
 
 
