@@ -4,7 +4,7 @@ import numpy as np
 
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw_msgs_py.rig import FRONT, REAR
-from dcdrw_msgs_py.samples import JointSample, LoneWheel, Turn
+from dcdrw_msgs_py.samples import SECOND, JointSample, LoneWheel, Turn
 from dcdrw_msgs_py.text_file import one_line
 from dcdrw_tracker.gait.pairing import WheelPairs
 from dcdrw_tracker.gait.phase import PhaseParams
@@ -24,12 +24,21 @@ class LoneWheels:
         self.unstamped = 0
         """Messages without a stamp, to which the time of recording was given."""
         self.missing = ''
-        """Which wheel the last message lacked, and what it names."""
+        """Which wheel the last message lacked, and what it names; or that the stamps of both never meet."""
+        self._latest_ns: dict[str, int] = {}
+        self._delays = dict.fromkeys(self._names, (0, 0.0))
+        """Number of each wheel's messages, and their mean time from stamp to recording [s]."""
 
     @property
     def unpaired(self) -> int:
         """Messages of a wheel to which none of the other one belongs."""
         return self._pairs.unpaired
+
+    @property
+    def offset(self) -> float:
+        """By how much later than the front wheel's the rear wheel's messages are recorded, by their stamps [s]."""
+        (front_count, front), (rear_count, rear) = self._delays.values()
+        return rear - front if front_count and rear_count and not self.unstamped else 0.0
 
     def belongs(self, batch: JointBatch) -> bool:
         """Whether a batch has just one of the wheels."""
@@ -40,9 +49,18 @@ class LoneWheels:
         name = next(name for name in self._names if name in batch.names)
         other = next(name for name in self._names if name not in batch.names)
         self.missing = f'joint {other} is missing; the message names {", ".join(map(one_line, batch.names))}'
+        if other in self._latest_ns and batch.messages:
+            apart = abs(int(batch.stamp_ns[-1]) - self._latest_ns[other]) / SECOND
+            self.missing = f'the stamps of {name} and {other} lie {apart:.3g} s apart: do their clocks agree?'
         column = batch.names.index(name)
         rows = zip(batch.stamp_ns.tolist(), batch.position[:, column], batch.velocity[:, column], strict=True)
         times = batch.log_ns.tolist() or [0] * batch.messages
+        self._latest_ns[name] = int(batch.stamp_ns[-1])
+        if len(batch.log_ns):
+            count, mean = self._delays[name]
+            count += batch.messages
+            mean += float(((batch.log_ns - batch.stamp_ns) / SECOND - mean).sum()) / count
+            self._delays[name] = count, mean
         for (stamp_ns, angle, rate), log_ns in zip(rows, times, strict=True):
             if stamp_ns == 0 and log_ns:
                 stamp_ns = log_ns

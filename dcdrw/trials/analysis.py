@@ -79,6 +79,8 @@ class Analysis(NamedTuple):
     """Messages, from the first of `motion` on; those that were refused included."""
     unreadable: str
     """Why the last one that could not be read could not be; empty where all could."""
+    wheels_apart: float = 0.0
+    """By how much later the rear wheel's own messages were recorded than the front wheel's, by their stamps [s]."""
     damage: tuple[str, ...] = ()
     """What of the recording was left out, for it is damaged."""
     notes: tuple[str, ...] = ()
@@ -333,6 +335,7 @@ class _Trial:
             cadence=self._cadence(),
             joint_states=self._received,
             unreadable=self._unreadable,
+            wheels_apart=self._lone.offset,
         )
 
 

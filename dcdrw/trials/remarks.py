@@ -35,6 +35,14 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         yield Remark(_as_sentence(HINTS[hint]), True)
     if trial.status.too_coarse:
         yield Remark(_as_sentence(coarseness(trial.status)), True)
+    shift = 100.0 * abs(trial.wheels_apart) * trial.status.steps / trial.seconds if trial.seconds > 0.0 else 0.0
+    if shift >= trial.params.sync.band_percent:
+        yield Remark(
+            f'By their stamps, messages of the rear wheel were recorded {1000.0 * trial.wheels_apart:+.0f} ms '
+            f"later than the front wheel's: unless they were so late, the clocks disagree, "
+            f'and the phase is off by {shift:.1f} %.',
+            True,
+        )
     if trial.resumed:
         yield Remark(f'{_begun_anew(trial, trial.resumed)}; what came before is left out.', True)
     refused = sum(estimator.refusals.values())

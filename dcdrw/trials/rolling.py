@@ -64,6 +64,9 @@ def table_samples(path: Path, rig: RigParams, begin: float = 0.0, end: float = m
         [(names.index(wheel + ending), size) for ending, size in UNITS.items() if wheel + ending in names]
         for wheel in ('psi1', 'psi2')
     ]
+    for name in ('time', 'psi1', 'psi2'):
+        if names.count(name) > 1:
+            raise ValueError(f'{path} has the column {name} {names.count(name)} times')
     if not times or not all(wheels):
         raise ValueError(f'{path} must have columns time, psi1, psi2 (or stamp_ns, psi1_deg, psi2_deg), got {names}')
     columns = (times[0], *(found[0] for found in wheels))
@@ -81,6 +84,9 @@ def table_samples(path: Path, rig: RigParams, begin: float = 0.0, end: float = m
 def _number(path: Path, line: int, row: list[str], place: int) -> float:
     cell = row[place].strip() if place < len(row) else ''
     try:
-        return float(cell or 'nan')
+        number = float(cell or 'nan')
     except ValueError:
-        raise ValueError(f'{path}, line {line}: {cell!r} is not a number') from None
+        number = math.inf
+    if math.isinf(number) or '_' in cell:
+        raise ValueError(f'{path}, line {line}: {cell!r} is not a number')
+    return number
