@@ -14,7 +14,7 @@ COLUMNS = (
     *('rank', 'spring', 'k', 'dashpot', 'b', 'worst_steps', 'worst_time', 'worst_steps_if_off'),
     *(*Loads._fields, 'stroke'),
     *(f'spring_{name}' for name in Order._fields),
-    'stall_slope',
+    *('stall_slope', 'stall_slope_sought'),
 )
 """Of a pair, in SI units."""
 SHOWN = 12
@@ -27,7 +27,7 @@ def pair_records(pairs: Sequence[Pair]) -> list[dict[str, Any]]:
     for rank, pair in enumerate(working(pairs), 1):
         parts = pair.spring.name, pair.spring.value, pair.dashpot.name, pair.dashpot.value
         judged = rank, *parts, pair.steps, pair.time, pair.steps_if_off
-        values = *judged, *load_record(pair).values(), *pair.order, pair.stall_slope
+        values = *judged, *load_record(pair).values(), *pair.order, pair.stall_slope, pair.stall_slope_sought
         records.append(dict(zip(COLUMNS, values, strict=True)))
     return records
 
@@ -69,6 +69,9 @@ def pair_lines(pairs: Sequence[Pair], starts: int) -> Iterator[str]:
         yield '      spring: its free length, or the least that bears this; stalls: on this slope and gentler ones'
     if len(good) > SHOWN:
         yield f'      and {len(good) - SHOWN} more: --out writes all of them to pairs.csv, --json tells them'
+    sought = sum(pair.stall_slope_sought for pair in good)
+    if sought < len(good):
+        yield f'      on which slope a pair stalls is sought of the best {sought} only, for the wheels differ'
     beyond = Counter(limit for pair in pairs if pair.verdict is Verdict.IN_STEP for limit in pair.exceeded)
     for limit, count in beyond.items():
         yield f'      left out, beyond the {limit}: {count} pair{"s" if count > 1 else ""}'

@@ -24,11 +24,13 @@ from dcdrw_sim.figures.identification_figures import draw_identification
 from dcdrw_sim.figures.style import for_print, new_figure
 from dcdrw_sim.identification.findings import (
     COMBINATIONS,
+    Fault,
     Finding,
     Gain,
     Misfit,
     Profile,
     combinations,
+    faults,
     gains,
     misfit,
     parameters,
@@ -69,6 +71,8 @@ class Outcome(NamedTuple):
     combined: list[Finding]
     gains: list[Gain]
     misfits: list[Misfit | None]
+    faults: list[list[Fault]]
+    """Of each trial."""
     profiles: list[Profile]
 
 
@@ -128,13 +132,15 @@ def run(options: argparse.Namespace) -> int:
             raise ValueError(f'{path}: {error}') from None
     with LiveLine() as line:
         fit = identify(known, trials, math.radians(options.zero_deg), line.show)
+        profiled = profiles(fit, line.show)
         outcome = Outcome(
             fit,
-            parameters(fit),
+            parameters(fit, profiled),
             combinations(fit),
             gains(fit),
             [misfit(fit, trial) for trial in fit.trials],
-            profiles(fit, line.show) if options.out else [],
+            [faults(fit, index) for index in range(len(fit.trials))],
+            profiled,
         )
     found = record(options.recordings, outcome)
     tell(options, report(options.recordings, outcome), found)
@@ -164,13 +170,14 @@ def _write(options: argparse.Namespace, outcome: Outcome, found: dict[str, Any])
 def report(recordings: Sequence[Path], outcome: Outcome) -> Iterator[str]:
     """Lines for a person."""
     fit = outcome.fit
-    for path, trial, left in zip(recordings, fit.trials, outcome.misfits, strict=True):
+    for path, trial, left, wrong in zip(recordings, fit.trials, outcome.misfits, outcome.faults, strict=True):
         count, outliers = trial.outliers.size, int(trial.outliers.sum())
         yield (
             f'{path}: {len(trial.residuals)} samples over {trial.samples.seconds[-1]:.1f} s, '
             f'residuals {math.degrees(trial.noise):.3f}° rms, {outliers} of {count} left out as outliers'
         )
         yield f'  {_explanation(left)}'
+        yield from (f'  {_warning(fault)}' for fault in wrong)
         if trial.memory > SLOW:
             yield f'  What is left goes on from sample to sample: {trial.memory:.0f} of them count as one.'
     yield ''
@@ -198,6 +205,19 @@ def _explanation(left: Misfit | None) -> str:
         f'NO parameters of the model explain this trial: the {(FRONT, REAR)[left.wheel]} wheel is off by '
         f'{math.degrees(left.worst):.2f}° from {left.begins:.1f} to {left.ends:.1f} s, '
         f'most at stance angles about {math.degrees(left.theta):.0f}°; the errors below mean nothing'
+    )
+
+
+def _warning(fault: Fault) -> str:
+    if fault.wheel is not None:
+        return (
+            f'The zero of the {(FRONT, REAR)[fault.wheel]} wheel is off by {math.degrees(fault.value):+.2f}° ± '
+            f'{math.degrees(fault.error):.2f}°, which is allowed for: calibrate it to learn more.'
+        )
+    late, early = (REAR, FRONT) if fault.value > 0.0 else (FRONT, REAR)
+    return (
+        f'The {late} wheel is stamped {1e3 * abs(fault.value):.1f} ± {1e3 * fault.error:.1f} ms later than the {early} '
+        'one, which is allowed for: mend the stamps to learn more.'
     )
 
 
@@ -262,18 +282,22 @@ def record(recordings: Sequence[Path], outcome: Outcome) -> dict[str, Any]:
                 'start_errors': starts.tolist(),
                 'zeros': trial.systematic[:, 0].tolist(),
                 'zero_errors': systematic[:, 0].tolist(),
+                'rear_late': trial.late,
+                'faults': wrong,
                 'noise': trial.noise,
                 'memory': trial.memory,
                 'outliers': int(trial.outliers.sum()),
                 'unexplained': left,
             }
-            for trial, left, (starts, systematic) in zip(fit.trials, outcome.misfits, _own_errors(fit), strict=True)
+            for trial, left, wrong, (starts, systematic, _) in zip(
+                fit.trials, outcome.misfits, outcome.faults, _own_errors(fit), strict=True
+            )
         ],
         'next': [gain._asdict() for gain in outcome.gains],
     }
 
 
-def _own_errors(fit: Fit) -> list[tuple[Floats, Floats]]:
+def _own_errors(fit: Fit) -> list[tuple[Floats, Floats, float]]:
     errors = np.sqrt(fit.whole_covariance.diagonal())
     return [fit.problem.own(trial, errors) for trial in range(len(fit.trials))]
 

@@ -1,7 +1,7 @@
 """What a fit tells: each parameter and combination with its error, what only the prior tells, and what to measure."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from enum import Enum
 from typing import NamedTuple
 
@@ -29,10 +29,13 @@ MOST_OUTLIERS = 0.1
 """A trial of more outliers is not explained."""
 WELL = 1e-5
 """Part of the squares by which a profile's last step changes them: by little beside 1."""
-PROFILE, QUICK = (0.9, 1.8), 10
-"""Where profiles are computed on either side, in standard errors; and evaluations for each at most."""
+PROFILE, QUICK = (0.9, 1.8, 2.7, 4.0, 6.0), 10
+"""Where profiles are computed on either side, in standard errors, until they leave the 90 % interval; and evaluations
+for one search at most."""
 FURTHER_PHASES = (0.15, 0.5, 0.85)
 """Starts of a further trial that are thought through."""
+BEYOND_CHANCE = 2.0
+"""A zero or stamps that are off by so many standard errors are told, where they were sought."""
 PIECES = 20
 """In so many pieces of time and stance angle it is looked for what a trial leaves unexplained."""
 
@@ -100,6 +103,17 @@ class Misfit(NamedTuple):
     """Mean residual of that time [rad]."""
 
 
+class Fault(NamedTuple):
+    """What is wrong with a trial's record, and was allowed for."""
+
+    wheel: int | None
+    """Whose zero it is, 0 the front's, 1 the rear's; None: the stamps of the rear beside the front."""
+    value: float
+    """What is measured too great [rad], or too late [s]."""
+    error: float
+    """Its standard error."""
+
+
 class Profile(NamedTuple):
     """How much worse the best explanation is with one parameter held elsewhere."""
 
@@ -107,6 +121,17 @@ class Profile(NamedTuple):
     values: Floats
     deviance: Floats
     """Twice the logarithm of the likelihood's ratio; a parabola (v − v̂)²/σ² where errors are even."""
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The 90 % interval; it ends where the profile does, if it does not rise so far there."""
+        roots = np.sqrt(np.maximum(self.deviance, 0.0))
+        best = int(np.argmin(roots))
+        low, high = (
+            float(np.interp(NORMAL_90, np.maximum.accumulate(roots[side]), self.values[side]))
+            for side in (slice(best, None, -1), slice(best, None))
+        )
+        return low, high
 
 
 def preload(rig: RigParams) -> float:
@@ -137,14 +162,15 @@ COMBINATIONS = (
 )
 
 
-def parameters(fit: Fit) -> list[Finding]:
-    """Each parameter that was sought."""
-    found = []
+def parameters(fit: Fit, profiled: Sequence[Profile] = ()) -> list[Finding]:
+    """Each parameter that was sought, its interval from its profile where there is one, else from its error."""
+    found, intervals = [], {profile.name: profile.interval for profile in profiled}
     for index, unknown in enumerate(fit.known.unknowns):
         at, error = fit.coordinates[index], math.sqrt(fit.covariance[index, index])
         low, high = (
             unknown.shown(_inside(at + sign * NORMAL_90 * error, unknown.low, unknown.form)) for sign in (-1, 1)
         )
+        low, high = intervals.get(unknown.name, (low, high))
         part = error / math.sqrt(fit.known.covariance[index, index])
         found.append(Finding(unknown.name, unknown.unit, unknown.shown(at), unknown.error(at, error), low, high, part))
     return found
@@ -247,30 +273,51 @@ def misfit(fit: Fit, trial: Explained) -> Misfit | None:
     )
 
 
+def faults(fit: Fit, index: int) -> list[Fault]:
+    """Zeros and stamps of a trial that are wrong, as far as the trial tells."""
+    errors = np.sqrt(np.diag(fit.whole_covariance))
+    (_, zeros, late), (_, of_zeros, of_late) = (fit.problem.own(index, x) for x in (fit.point, errors))
+    found = [Fault(wheel, float(zeros[wheel, 0]), float(of_zeros[wheel, 0])) for wheel in range(2)]
+    found.append(Fault(None, late, of_late))
+    return [one for one in found if fit.allowing and abs(one.value) > BEYOND_CHANCE * one.error]
+
+
 def profiles(fit: Fit, told: Callable[[str], None] = unheard) -> list[Profile]:
     """The profile of each parameter: all others, and the starts, sought anew with it held; `told` what is done next."""
-    found = []
-    best = fit.problem.squares(fit.point)
-    errors = np.sqrt(np.diag(fit.whole_covariance))
+    found, best = [], fit.problem.squares(fit.point)
     for index, unknown in enumerate(fit.known.unknowns):
         told(f'how well {unknown.name} is known ({index + 1} of {len(fit.known.unknowns)}) ...')
-        along = fit.whole_covariance[:, index] / errors[index]
-        low, high = (bound[index] for bound in fit.known.bounds())
-        values, deviances = [fit.coordinates[index]], [0.0]
+        at, error = fit.coordinates[index], math.sqrt(fit.covariance[index, index])
+        bounds = [bound[index] for bound in fit.known.bounds()]
+        points = {at: 0.0}
         for way in (-1.0, 1.0):
-            point = fit.point
+            point, deviance = fit.point, 0.0
             for factor in PROFILE:
-                value = fit.coordinates[index] + way * factor * errors[index]
-                if not low <= value <= high:
+                value = float(np.clip(at + way * factor * error, *bounds))
+                if value in points or deviance > NORMAL_90**2:
                     break
                 held, more = fit.problem.held(index, value)
-                others = point + (value - point[index]) / errors[index] * along
-                others = held.solve(np.delete(others, index), robust=False, settled=WELL, evaluations=QUICK)
-                values.append(value)
-                deviances.append(held.squares(others) + more - best)
+                others = np.delete(_followed(fit, point, index, value), index)
+                others = held.solve(others, robust=False, settled=WELL, evaluations=QUICK)
+                deviance = points[value] = held.squares(others) + more - best
                 point = np.insert(others, index, value)
-        order = np.argsort(values)
-        found.append(
-            Profile(unknown.name, np.array([unknown.shown(values[i]) for i in order]), np.array(deviances)[order])
-        )
+        values = sorted(points)
+        shown = np.array([unknown.shown(value) for value in values])
+        found.append(Profile(unknown.name, shown, np.array([points[value] for value in values])))
     return found
+
+
+def _followed(fit: Fit, point: Floats, index: int, value: float) -> Floats:
+    """Where the best point goes when one unknown is moved, as far as the problem is linear and bounds allow."""
+    moved: Floats = point.copy()
+    held = np.arange(len(point)) == index
+    moved[index] = value
+    curvature = np.linalg.inv(fit.whole_covariance)
+    while True:
+        off = curvature[np.ix_(~held, held)] @ (moved - point)[held]
+        moved[~held] = point[~held] - np.linalg.solve(curvature[np.ix_(~held, ~held)], off)
+        inside = np.clip(moved, fit.problem.low, fit.problem.high)
+        beyond = (inside != moved) & ~held
+        if not beyond.any():
+            return moved
+        moved, held = inside, held | beyond

@@ -1,8 +1,8 @@
 """Least squares: the rig, and each trial's start, under which the model's samples are nearest to those of the trials.
 
-Of each trial more numbers are sought: its start, and the systematic errors of both wheels' rotations. Samples
-of an angle are continuous functions of all parameters, strikes and all: only speeds jump. Their derivatives are
-differences of trajectories that run side by side, as one ensemble.
+Of each trial more numbers are sought: its start, the systematic errors of both wheels' rotations, and by how much one
+wheel's stamps are late. Samples of an angle are continuous functions of all parameters, strikes and all: only speeds
+jump. Their derivatives are differences of trajectories that run side by side, as one ensemble.
 """
 
 import math
@@ -40,15 +40,22 @@ INSIDE = 0.15, 0.5, 1.0
 several valleys."""
 WORTHWHILE = 0.1
 """What a search begun anew must gain [of squares in standard deviations] to be followed by another."""
-EVALUATIONS = 60
-"""At most, of one search."""
+EVALUATIONS, SEARCHES = 60, 6
+"""At most, of one search; and so many searches for one point."""
 ZERO = math.radians(0.02)
 """To what a wheel's zero is taken to be known by default, as well as `dcdrw calibrate` finds it [rad]."""
 PARTS, REPEATED = 12, math.radians(0.005)
 """In each of so many parts of the stance angle samples share an error that repeats from step to step, as a camera's do
 that sees tags at the same angles; of this standard deviation [rad]."""
-START, OWN = 4, 4 + 2 * (1 + PARTS)
-"""Numbers of a trial's own: θ1, ω1, θ2, ω2 at its first sample, and the systematic errors of ψ1 and ψ2."""
+START, ERRORS = 4, 2 * (1 + PARTS)
+OWN = START + ERRORS + 1
+"""Numbers of a trial's own: θ1, ω1, θ2, ω2 at its first sample, the systematic errors of ψ1 and ψ2, and by how much
+the rear wheel's stamps are later than the front's [s]."""
+WRONG_ZERO, WRONG_STAMPS = math.radians(2.0), 0.1
+"""Standard deviations of a zero [rad] and of stamps [s] that are wrong."""
+EVIDENT = 8.0
+"""Zeros or stamps are taken for wrong where that explains so much more [of squares in standard deviations]: by chance
+that is so in one of twenty trials, whose errors are but greater then."""
 Mask = NDArray[np.bool_]
 
 
@@ -60,6 +67,8 @@ class Explained(NamedTuple):
     """[θ1, ω1, θ2, ω2] at the first sample."""
     systematic: Floats
     """What ψ1 and ψ2 were measured to be too great, everywhere and in each part [rad], shape (2, 1 + PARTS)."""
+    late: float
+    """By how much the rear wheel's stamps are later than the front's [s]."""
     residuals: Floats
     """What was measured less what the model has [rad], shape (T, 2)."""
     outliers: Mask
@@ -84,6 +93,7 @@ class Problem:
         deviations: standard deviation of each trial's samples [rad].
         used: samples of each trial that count, shape (T, 2); None: all.
         zero: to what the wheels' zeros are known [rad].
+        late: to what it is known that both wheels' samples are of one time [s]; 0: they are.
 
     """
 
@@ -94,8 +104,10 @@ class Problem:
         deviations: Sequence[float],
         used: Sequence[Mask] | None = None,
         zero: float = ZERO,
+        late: float = 0.0,
     ) -> None:
-        self.known, self.trials, self._deviations, self._zero = known, trials, deviations, zero
+        self.known, self.trials, self._deviations = known, trials, deviations
+        self._zero, self._late = zero, late
         self._used = used or [np.ones(trial.rotations.shape, bool) for trial in trials]
         self._size = len(known.unknowns)
         self._steps = STEP * np.sqrt(np.diag(known.covariance))
@@ -103,13 +115,13 @@ class Problem:
         self._at: Floats = np.empty(0)
         self._found: tuple[Floats, Floats] = (self._at, self._at)
         front, rear = known.rig.front, known.rig.rear
-        self._shares = [_shares(trial, np.array([front.alpha, rear.alpha])) for trial in trials]
+        self._shares = [shares(trial, np.array([front.alpha, rear.alpha])) for trial in trials]
         farthest = np.tile([front.alpha, math.inf, rear.alpha, math.inf, *[math.inf] * (OWN - START)], len(trials))
         low, high = known.bounds()
         self.low, self.high = np.concatenate([low, -farthest]), np.concatenate([high, farthest])
 
     def rotations(self, trial: int, points: Floats) -> Floats:
-        """ψ of a trial's samples [rad] at N points: coordinates and the trial's own, shape (N, T, 2)."""
+        """ψ of a trial's samples [rad] at N points: coordinates and the trial's own, all as late; shape (N, T, 2)."""
         columns = {
             name: column
             for unknown, coordinates in zip(self.known.unknowns, points.T, strict=False)
@@ -117,10 +129,18 @@ class Problem:
         }
         rig, samples = self.known.rig, self.trials[trial]
         rig = rig._replace(S0=float(stance_distance(rig.front, rig.rear, rig.S0, samples.steps, 0)))
-        starts, systematic = np.split(points[:, self._size :], [START], axis=1)
-        rotations = sample_pairs(spread(rig, len(points), columns), starts, samples.seconds, TOLERANCE)
+        starts, systematic, late = np.split(points[:, self._size :], [START, START + ERRORS], axis=1)
+        times = samples.seconds[:, None] + np.maximum([late[0, 0], -late[0, 0]], 0.0)  # of the wheel that is not late
+        asked, places = np.unique(times, return_inverse=True)
+        rotations = sample_pairs(spread(rig, len(points), columns), starts, asked, TOLERANCE)
+        rotations = rotations[:, places.reshape(times.shape), [0, 1]]
         errors = np.einsum('twk,nwk->ntw', self._shares[trial], systematic.reshape(len(points), 2, -1))
         return np.asarray(rotations + errors)
+
+    @property
+    def allowing(self) -> bool:
+        """Whether zeros and stamps that are wrong are allowed for."""
+        return self._late > 0.0
 
     def residuals(self, x: Floats) -> Floats:
         """Weighed residuals; then, in standard deviations, by what systematic errors and unknowns are off."""
@@ -145,11 +165,14 @@ class Problem:
             residuals.append((rotations[0] - samples.rotations)[used] / deviation)
             block = np.zeros((np.count_nonzero(used), len(x)))
             block[:, moved] = (rotations[1:] - rotations[0])[:, used].T / steps / deviation
-            shares = np.einsum('twk,wv->twvk', self._shares[index], np.eye(2)).reshape(*samples.rotations.shape, -1)
-            block[:, added] = shares[used] / deviation
+            parts = np.einsum('twk,wv->twvk', self._shares[index], np.eye(2)).reshape(*samples.rotations.shape, -1)
+            block[:, added[:-1]] = parts[used] / deviation
+            if self.allowing:
+                later = points[:1] + STEP * (np.arange(points.shape[1]) == points.shape[1] - 1)
+                block[:, added[-1]] = (self.rotations(index, later) - rotations[0])[0, used] / STEP / deviation
             blocks.append(block)
         assumed = [place for index in range(len(self.trials)) for place in self._own(index)[START:]]
-        widths = np.tile([self._zero, *[REPEATED] * PARTS], 2 * len(self.trials))
+        widths = np.tile([*[self._zero, *[REPEATED] * PARTS] * 2, self._late or STEP], len(self.trials))
         residuals.append(x[assumed] / widths)
         blocks.append(np.eye(len(x))[assumed] / widths[:, None])
         residuals.append(solve_triangular(self._root, x[:size] - self.known.coordinates, lower=True))
@@ -163,10 +186,10 @@ class Problem:
         first = self._size + OWN * trial
         return range(first, first + OWN)
 
-    def own(self, trial: int, x: Floats) -> tuple[Floats, Floats]:
-        """Start and systematic errors of a trial, at a point or in its errors."""
-        start, systematic = np.split(x[self._own(trial)], [START])
-        return start, systematic.reshape(2, -1)
+    def own(self, trial: int, x: Floats) -> tuple[Floats, Floats, float]:
+        """Start, systematic errors and lateness of a trial, at a point or in its errors."""
+        start, systematic, late = np.split(x[self._own(trial)], [START, START + ERRORS])
+        return start, systematic.reshape(2, -1), float(late[0])
 
     def misfit(self, x: Floats) -> float:
         """The sum that a robust `solve` makes small."""
@@ -190,34 +213,63 @@ class Problem:
         best, before = x, math.inf
         while self.squares(best) < before - WORTHWHILE:
             before = self.squares(best)
-            for index in np.flatnonzero(x[: self._size] <= self.low[: self._size] + self._steps):
+            for index in np.flatnonzero(self._bound(x)):
                 column = self.covariance(best)[:, index]
                 moved = best + column / math.sqrt(column[index])
                 found = self.solve(moved, robust=False, settled=SETTLED)
                 best = min(best, found, key=self.squares)
         return best
 
+    def _bound(self, x: Floats) -> Mask:
+        """Which numbers lie on their lower bounds."""
+        bound = np.zeros(len(x), bool)
+        bound[: self._size] = x[: self._size] <= self.low[: self._size] + self._steps
+        return bound
+
     def held(self, index: int, coordinate: float) -> tuple['Problem', float]:
         """The same with one unknown held, and what that adds to the squares."""
         known, square = self.known.held(index, coordinate)
-        return Problem(known, self.trials, self._deviations, self._used, self._zero), square
+        return Problem(known, self.trials, self._deviations, self._used, self._zero, self._late), square
+
+    def weighed(self, trials: Sequence[Explained], zero: float | None = None, late: float | None = None) -> 'Problem':
+        """The same with samples that weigh, and outliers that are left out, as trials were explained."""
+        return Problem(
+            self.known,
+            self.trials,
+            [trial.deviation for trial in trials],
+            [~trial.outliers for trial in trials],
+            self._zero if zero is None else zero,
+            self._late if late is None else late,
+        )
 
     def solve(self, x: Floats, robust: bool = True, settled: float = ROUGHLY, evaluations: int = EVALUATIONS) -> Floats:
-        """The best point, from x on; errors that repeat are sought in the end only, where it is not robust."""
-        inside = np.clip(x, self.low, self.high)
-        free = np.ones(len(x), bool)
+        """The best point, from x on; errors that repeat are sought in the end only, where it is not robust.
+
+        A search that comes to a bound may stop short of the best point along it: what lies there is held, and the
+        others are sought again. In a long valley one search does not get to the end.
+        """
+        x, held = np.clip(x, self.low, self.high), np.zeros(len(x), bool)
+        for _ in range(SEARCHES):
+            x, arrived = self._search(x, held, robust, settled, evaluations)
+            if (self._bound(x) == held).all() and (arrived or robust):
+                break
+            held = self._bound(x)
+        return x
+
+    def _search(self, begin: Floats, held: Mask, robust: bool, settled: float, evaluations: int) -> tuple[Floats, bool]:
+        free = ~held
         if robust:
             for trial in range(len(self.trials)):
-                free[self._own(trial)[START:]] = np.tile(np.arange(1 + PARTS) == 0, 2)
+                free[self._own(trial)[START:]] = [*np.tile(np.arange(1 + PARTS) == 0, 2), False]
 
         def whole(sought: Floats) -> Floats:
-            point: Floats = inside.copy()
+            point: Floats = begin.copy()
             point[free] = sought
             return point
 
         found = least_squares(
             lambda sought: self.residuals(whole(sought)),
-            inside[free],
+            begin[free],
             lambda sought: self.jacobian(whole(sought))[:, free],
             bounds=(self.low[free], self.high[free]),
             method='dogbox',
@@ -229,7 +281,7 @@ class Problem:
             gtol=1e-10,
             max_nfev=evaluations,
         )
-        return whole(np.asarray(found.x, float))
+        return whole(np.asarray(found.x, float)), found.status > 0
 
     def information(self, x: Floats) -> Floats:
         """What the trials tell of the unknowns, their own being unknown: an inverse covariance, shape (P, P)."""
@@ -250,6 +302,11 @@ class Fit(NamedTuple):
     whole_covariance: Floats
     """Of the point."""
     trials: tuple[Explained, ...]
+
+    @property
+    def allowing(self) -> bool:
+        """Whether zeros and stamps that are wrong were allowed for."""
+        return self.problem.allowing
 
     @property
     def known(self) -> Knowledge:
@@ -284,6 +341,7 @@ def identify(
 
     From the first seconds on to the whole, so that a phase that drifts does not lead astray; outliers lose their weight
     first, and are left out at last. The noise is that of the residuals; where one resembles the next, fewer count.
+    Zeros and stamps are taken for wrong only where that explains evidently more; then they are sought, too.
 
     Args:
         known: of the rig before.
@@ -314,31 +372,40 @@ def identify(
     told('explaining all samples ...')
     whole = Problem(known, trials, rough, zero=zero)
     x = whole.solve(x)
-    explained = _explained(whole, x)
-    used = [~one.outliers for one in explained]
     told('explaining all samples but outliers ...')
-    problem = Problem(known, trials, [one.deviation for one in explained], used, zero)
+    fit = _ended(whole, x)
+    told('looking for wrong zeros and late stamps ...')
+    doubtful = fit.problem.weighed(fit.trials, max(zero, WRONG_ZERO), WRONG_STAMPS)
+    x = doubtful.solve(fit.point, robust=False, settled=SETTLED)
+    if fit.problem.squares(fit.point) - doubtful.squares(x) < EVIDENT:
+        return fit
+    return _ended(doubtful, x)
+
+
+def _ended(problem: Problem, x: Floats) -> Fit:
+    """The fit by which a search ends: outliers are left out as they are at first, the noise is as it is at last."""
+    problem = problem.weighed(_explained(problem, x))
     x = problem.released(problem.solve(x, robust=False, settled=SETTLED))
     explained = _explained(problem, x)
-    problem = Problem(known, trials, [one.deviation for one in explained], used, zero)
+    problem = problem.weighed(explained)
     return Fit(problem, x, problem.covariance(x), tuple(explained))
 
 
 def _explained(problem: Problem, x: Floats) -> list[Explained]:
     size, found = len(problem.known.unknowns), []
     for index, samples in enumerate(problem.trials):
-        start, systematic = problem.own(index, x)
-        rotations = problem.rotations(index, np.concatenate([x[:size], start, systematic.ravel()])[None])[0]
+        start, systematic, late = problem.own(index, x)
+        rotations = problem.rotations(index, np.concatenate([x[:size], start, systematic.ravel(), [late]])[None])[0]
         residuals = samples.rotations - rotations
         spread_of = max(float(np.median(np.abs(residuals))) / 0.6745, 1e-9)
         outliers = np.abs(residuals) > OUTLYING * spread_of
         noise = float(np.sqrt(np.mean(residuals[~outliers] ** 2)))
         memory = _memory(residuals, outliers)
-        found.append(Explained(samples, start, systematic, residuals, outliers, max(noise, 1e-9), memory))
+        found.append(Explained(samples, start, systematic, late, residuals, outliers, max(noise, 1e-9), memory))
     return found
 
 
-def _shares(samples: Samples, alphas: Floats) -> Floats:
+def shares(samples: Samples, alphas: Floats) -> Floats:
     """What systematic errors of 1 add to a trial's rotations, shape (T, 2, 1 + PARTS)."""
     angles = (samples.rotations + alphas) / (2.0 * alphas)
     part = (angles % 1.0 * PARTS).astype(int)

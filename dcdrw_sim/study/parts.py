@@ -61,7 +61,9 @@ class Pair(NamedTuple):
     order: Order
     """Of the spring."""
     stall_slope: float = math.nan
-    """As `dcdrw_sim.study.design.stall_slopes` [rad]; NaN also where it was not looked at."""
+    """As `dcdrw_sim.study.design.stall_slopes` [rad]; NaN also where it was not sought."""
+    stall_slope_sought: bool = False
+    """Not that of pairs that do not work, nor, with unequal wheels, beyond the best LOOKED_AT."""
 
     @property
     def works(self) -> bool:
@@ -111,6 +113,6 @@ def rank(task: Task, parts: Iterable[Part], tolerance: float, report: Report = l
     seen = [pair for pair in pairs if pair.works][: None if equal else LOOKED_AT]
     values = np.array([(pair.spring.value, pair.dashpot.value) for pair in seen]).reshape(-1, 2)
     slopes = stall_slopes(task, *values.T) if seen else np.empty(0)
-    return [pair._replace(stall_slope=float(slope)) for pair, slope in zip(seen, slopes, strict=True)] + pairs[
-        len(seen) :
-    ]
+    sought = zip(seen, slopes.tolist(), strict=True)
+    looked_at = [pair._replace(stall_slope=slope, stall_slope_sought=True) for pair, slope in sought]
+    return looked_at + pairs[len(seen) :]

@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 
 from dcdrw_msgs_py.rig import RigParams, WheelParams
-from dcdrw_sim.identification.findings import combinations, gains, misfit, parameters, profiles, together
+from dcdrw_sim.identification.findings import (
+    NORMAL_90,
+    Profile,
+    combinations,
+    faults,
+    gains,
+    misfit,
+    parameters,
+    profiles,
+    together,
+)
 from dcdrw_sim.identification.fit import identify
 from dcdrw_sim.identification.samples import free_rolling
 from dcdrw_sim.identification.unknowns import Uncertainty, knowledge, unknowns_of
@@ -148,11 +158,57 @@ def test_zeros_that_are_known_badly_are_found():
     assert found.trials[0].systematic[0, 0] == pytest.approx(math.radians(0.5), abs=3.0 * error)
 
 
+@pytest.mark.parametrize('wheel', [0, 1])
+def test_a_zero_that_is_wrong_is_told_and_allowed_for(wheel):
+    times, psi = trial(seconds=10.0)
+    psi[:, wheel] += math.radians(0.5)
+    found = identify(knowledge(SAID, FIXED), [free_rolling(SAID, times, psi)])
+    [fault] = faults(found, 0)
+    assert fault.wheel == wheel
+    assert fault.value == pytest.approx(math.radians(0.5), abs=3.0 * fault.error)
+    assert np.abs(deviations(found)).max() < 3.0
+
+
+@pytest.mark.parametrize('late', [-0.02, 0.02])
+def test_a_wheel_whose_stamps_are_late_is_told_and_allowed_for(late):
+    """Whichever wheel it is: the other one's are early."""
+    times, psi = trial(seconds=10.0)
+    motion = run(*start(TRUE, 0.216), 11.0)
+    noise = psi[:, 1] - motion.at(times).rotation2
+    psi[:, 1] = motion.at(np.maximum(times - late, 0.0)).rotation2 + noise
+    found = identify(knowledge(SAID, FIXED), [free_rolling(SAID, times[2:], psi[2:])])
+    [fault] = faults(found, 0)
+    assert fault.wheel is None
+    assert fault.value == pytest.approx(late, abs=3.0 * fault.error)
+    assert np.abs(deviations(found)).max() < 3.0
+
+
+def test_a_record_without_faults_has_none(fit):
+    assert not fit.allowing
+    assert faults(fit, 0) == []
+
+
 def test_profiles_are_parabolas_where_errors_are_even(fit):
     found = {profile.name: profile for profile in profiles(fit)}
     error = math.sqrt(fit.covariance[0, 0])
     profile = found[fit.known.unknowns[0].name]
     assert profile.deviance == pytest.approx(((profile.values - fit.coordinates[0]) / error) ** 2, rel=0.3, abs=0.2)
+
+
+def test_intervals_end_where_profiles_leave_them():
+    even = Profile('even', np.array([-2.0, -1.0, 0.0, 1.0, 2.0]), np.array([4.0, 1.0, 0.0, 1.0, 4.0]))
+    assert even.interval == pytest.approx((-NORMAL_90, NORMAL_90))
+    bound = Profile('bound', np.array([0.0, 1.0, 4.0]), np.array([0.5, 0.0, 9.0]))
+    assert bound.interval == pytest.approx((0.0, 1.0 + NORMAL_90))
+
+
+def test_a_skew_problem_has_skew_intervals():
+    """With nothing given, masses, damping and rest length go together, far up rather than far down."""
+    found = identify(knowledge(SAID._replace(slope=math.radians(2.0))), [free_rolling(SAID, *trial(seconds=10.0))])
+    told = {finding.name: finding for finding in parameters(found, profiles(found))}
+    assert told['D0'].high - told['D0'].value > 1.3 * (told['D0'].value - told['D0'].low)
+    for name, truth in (('D0', TRUE.D0), ('b', TRUE.b), ('mass', 9.0), ('coupler_friction', TRUE.coupler_friction)):
+        assert told[name].low <= truth <= told[name].high
 
 
 def test_what_was_known_before_is_kept():
