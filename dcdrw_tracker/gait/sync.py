@@ -304,7 +304,7 @@ class SyncMonitor:
             edge += min(params.band_hysteresis_percent, NOISE_SPAN * math.sqrt(self._noise2))
         is_gap = self._cadence.is_gap(dt)
         is_blind = is_gap and dt > SMOOTHING  # for so long that rates foretell nothing
-        if is_gap:
+        if is_blind:
             self._was_seen = False
         if front or rear:
             foretold = self._cross(last, phase, front, rear, dt, edge, is_blind)
@@ -316,7 +316,7 @@ class SyncMonitor:
         speed = abs(phase.phi.rate)
         if speed > self._fastest:
             self._fastest = speed
-        if is_gap:
+        if is_blind:
             self._take_gap(before, dt, strikes, edge)
         elif front:
             self._was_seen = True

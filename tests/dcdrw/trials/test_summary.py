@@ -82,6 +82,12 @@ def test_steps_are_left_open_where_a_gap_may_hide_the_last_excursion_and_there_a
     assert certain >= 7  # of 14
 
 
+def test_samples_lost_all_along_leave_no_steps_open_where_their_speeds_tell_what_came_between():
+    summary = summarize(trial([sample for i, sample in enumerate(rolled(RATE)) if i % 5]))
+    assert summary.samples.gaps > 1000
+    assert summary.steps_to_synchronization == summary.steps_to_synchronization_at_latest == 38
+
+
 def test_an_excursion_that_fell_into_a_gap_is_not_ruled_out():
     seen = [sample for i, sample in enumerate(rolled(RATE)) if not 21.0 < i / RATE < 21.3]
     summary = summarize(trial(seen))
