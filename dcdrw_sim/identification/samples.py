@@ -16,7 +16,7 @@ FEWEST = 30
 """Samples that are needed to tell anything."""
 AWAY = math.radians(1.0)
 """A trial is followed from a sample at which both wheels are so far from striking."""
-RATE_ENOUGH = 200.0
+RATE_ENOUGH = 100.0
 """Of faster trials neighbours are taken together [Hz]: strikes are still told from each other, and time and memory go
 with the number of samples."""
 NEAR = 0.15
