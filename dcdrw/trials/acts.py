@@ -1,17 +1,37 @@
 """What the synchronizer did in a recorded trial, and when, by the stamps of the joint states. Knows no ROS."""
 
 from collections.abc import Iterable, Iterator
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.recording import Recording
+from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.topics import SYNCHRONIZER_STATE
 
 EVERY = 64
 """Of so many messages one is remembered: a source that lags more and more is followed."""
 Acts = tuple[tuple[int, str], ...]
 """Stamps, and what the synchronizer did from then on."""
+
+
+class Stretch(NamedTuple):
+    """A time in which the synchronizer did one thing."""
+
+    state: str
+    begin: float
+    """Since the trial's start [s]."""
+    end: float
+    """Likewise."""
+
+
+def stretches(acts: Acts, start_ns: int, seconds: float) -> list[Stretch]:
+    """What it did one after the other, of a trial that starts at a stamp and takes so many seconds."""
+    told = [(max((stamp_ns - start_ns) / SECOND, 0.0), state) for stamp_ns, state in acts]
+    pairs = pairwise([*told, (seconds, '')])
+    return [Stretch(state, begin, min(end, seconds)) for (begin, state), (end, _) in pairs if begin < min(end, seconds)]
 
 
 class Clock:

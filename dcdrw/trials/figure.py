@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dcdrw.trials.acts import stretches
 from dcdrw.trials.analysis import Analysis
 from dcdrw.trials.motion import MotionTable, thinned
 from dcdrw_control.sync.safety import State
@@ -304,13 +305,9 @@ def _draw_force(axes: Any, course: _Course) -> None:
 def _draw_acts(axes: Any, course: _Course) -> None:
     """A bar for each state of the synchronizer, from when it was told on."""
     start_ns, end = int(course.motion.stamp_ns[0]) if len(course.time) else 0, max(course.time, default=0.0)
-    told = [(max((stamp_ns - start_ns) / SECOND, 0.0), state) for stamp_ns, state in course.trial.acts]
+    told = stretches(course.trial.acts, start_ns, end)
     for state, colour in STATES.items():
-        bars = [
-            (begin, until - begin)
-            for (begin, said), (until, _) in pairwise([*told, (end, '')])
-            if said == state.value and begin < until
-        ]
+        bars = [(one.begin, one.end - one.begin) for one in told if one.state == state.value]
         axes.broken_barh(bars, (0.0, 1.0), color=colour, linewidth=0, label=state.value if bars else None)
     axes.set_yticks([])
     axes.set_ylim(0.0, 1.0)

@@ -4,7 +4,9 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from dcdrw.trials.acts import stretches
 from dcdrw.trials.analysis import Analysis, Resumption
+from dcdrw_control.sync.safety import State
 from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND
@@ -62,6 +64,13 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
     if trial.state is PairState.SYNCHRONIZED and trial.status.steps_at_latest != trial.status.steps_to_synchronization:
         yield Remark(
             f'A gap may hide that the error left the band later: in step after {trial.status.steps_text} steps.'
+        )
+    faults = [one for one in stretches(trial.acts, trial.start_ns, trial.seconds) if one.state == State.FAULT.value]
+    if faults:
+        seconds, begin = sum(one.end - one.begin for one in faults), faults[0].begin
+        yield Remark(
+            f'The synchronizer was in fault for {seconds:.1f} of {trial.seconds:.1f} s, from {begin:.1f} s on, '
+            'and gave no force meanwhile.'
         )
     if estimator.n_uncertain:
         yield Remark('A gap was long enough to hide a step: n may be off.')

@@ -127,6 +127,15 @@ def test_what_is_too_coarse_depends_on_the_band():
         assert summarize(analyze([batch(seen)], params)).complete is complete
 
 
+def test_a_synchronizer_that_was_in_fault_is_said():
+    start_ns = WALK[0].stamp_ns
+    acts = ((start_ns, 'active'), (start_ns + 5 * SECOND, 'fault'), (start_ns + 7 * SECOND, 'disabled'))
+    faulty = summarize(trial(WALK)._replace(acts=acts))
+    assert 'The synchronizer was in fault for 2.0 of 20.0 s, from 5.0 s on' in faulty.sentence
+    assert faulty.complete
+    assert 'fault' not in summarize(trial(WALK)._replace(acts=acts[:1])).sentence
+
+
 def test_a_trial_that_ends_within_the_band_too_early_is_not_said_to_be_outside():
     entered = summarize(trial(WALK)).steps_to_synchronization
     strikes = [fall.stamp_ns for fall in trial(WALK).footfalls if fall.wheel == 'front']
