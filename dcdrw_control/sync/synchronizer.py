@@ -129,8 +129,8 @@ class Synchronizer:
             self.safety.trip('slipped')
         for i, (turn, wheel) in enumerate(((sample.front, self.params.front), (sample.rear, self.params.rear))):
             before = (last.front, last.rear)[i] if last else turn
-            if abs(turn.angle - before.angle) > wheel.alpha or not math.isfinite(self._struck[i]):
-                self._struck[i] = now
+            if abs(turn.angle - before.angle) > wheel.alpha:
+                self._struck = [now if j == i or not self._walks else at for j, at in enumerate(self._struck)]
         if self.params.law != 'off':
             self._law.update(sample)
         self._last, self._heard = sample, now
@@ -145,12 +145,13 @@ class Synchronizer:
         if is_stale and self._was_stale:
             self.safety.trip('stale')
         self._was_stale = is_stale
-        has_stalled = not is_stale and now - min(self._struck) > self.params.stall_after
+        has_stalled = self._walks and not is_stale and now - min(self._struck) > self.params.stall_after
         if has_stalled:
             self.safety.trip('stalled')
         wanted = self._law.wanted(now)
         ready = (
             self.params.law != 'off'
+            and self._walks  # wheels that are held are not pushed
             and not is_stale
             and not has_stalled
             and math.isfinite(wanted)
@@ -170,6 +171,11 @@ class Synchronizer:
         self._asked = now
         force, torque = (0.0, effort) if self.drives_hub else (effort, 0.0)
         return Command(force, torque, state, self._last.stamp_ns if self._last else 0)
+
+    @property
+    def _walks(self) -> bool:
+        """Whether a wheel has struck since the input began."""
+        return math.isfinite(min(self._struck))
 
     def _forget(self) -> None:
         """Know nothing of the input any more."""

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
 
+from dcdrw.suite.hub_gains import hub_gains
 from dcdrw_control.sync.hold import HoldGains
 from dcdrw_control.sync.safety import State
 from dcdrw_control.sync.synchronizer import Synchronizer, SynchronizerParams
@@ -94,6 +95,19 @@ def test_with_law_off_it_stays_armed_and_commands_nothing():
     rows = list(walk(PAPER, params_for(PAPER, 'off'), 0.2, 3.0))
     assert {force for _, _, force, _, _ in rows} == {0.0}
     assert {state for *_, state in rows} == {State.ARMED}
+
+
+@pytest.mark.parametrize('name', ['hold', 'rear'])
+def test_wheels_that_are_held_are_not_pushed_and_have_not_stalled(name):
+    params = HOLD._replace(law=name, hub=hub_gains(PAPER.resolved()))
+    core, estimator = Synchronizer(params), PhaseEstimator(PhaseParams())
+    for tick in range(round(5.0 * RATE)):
+        t = tick / RATE
+        core.update(estimator.update(JointSample(round(t * 1e9) + 1, Turn(0.1, 0.0), Turn(0.2, 0.0))).phase, t)
+        core.enable(t, True)
+        command = core.command(t)
+        assert (command.force, command.torque) == (0.0, 0.0)
+    assert command.state is State.ARMED
 
 
 def pushing() -> tuple[Synchronizer, PhaseSample, float]:
