@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from dcdrw_msgs_py.words import counted
 from dcdrw_sim.study.design import Assessment
 from dcdrw_sim.study.loads import Loads, Order
 from dcdrw_sim.study.parts import Pair
@@ -74,4 +75,4 @@ def pair_lines(pairs: Sequence[Pair], starts: int) -> Iterator[str]:
         yield f'      on which slope a pair stalls is sought of the best {sought} only, for the wheels differ'
     beyond = Counter(limit for pair in pairs if pair.verdict is Verdict.IN_STEP for limit in pair.exceeded)
     for limit, count in beyond.items():
-        yield f'      left out, beyond the {limit}: {count} pair{"s" if count > 1 else ""}'
+        yield f'      left out, beyond the {limit}: {counted(count, "pair")}'

@@ -9,6 +9,8 @@ from collections.abc import Mapping, Sequence
 from enum import Enum, IntEnum
 from typing import NamedTuple, TypeVar
 
+from dcdrw_msgs_py.words import by_count, counted
+
 State = TypeVar('State', bound=Enum)
 Value = str | float | bool | Enum
 
@@ -156,5 +158,7 @@ def lost_since(diagnosis: Diagnosis, before: float) -> Diagnosis:
     lost, rate = (diagnosis.values.get(key, 0.0) for key in (LOST_SAMPLES, RATE_IN))
     if not (isinstance(lost, (int, float)) and isinstance(rate, (int, float)) and lost - before > NOTICEABLE * rate):
         return diagnosis
-    message = f'{lost - before:g} samples were lost within a second; {diagnosis.message}'
+    count = lost - before
+    were = by_count(count, 'was', 'were')
+    message = f'{counted(f"{count:g}", "sample")} {were} lost within a second; {diagnosis.message}'
     return diagnosis._replace(level=max(diagnosis.level, Level.WARN), message=message)

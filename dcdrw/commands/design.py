@@ -20,6 +20,7 @@ from dcdrw.trials.monitored import monitored
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.values import Floats
+from dcdrw_msgs_py.words import counted
 from dcdrw_sim.figures.style import for_print, new_figure
 from dcdrw_sim.identification.unknowns import knowledge, unknowns_of
 from dcdrw_sim.model.scaling import nondimensional
@@ -259,8 +260,8 @@ def _outlook_lines(outlooks: dict[str, Outlook]) -> Iterator[str]:
 
 
 def _likely(one: Outlook) -> str:
-    late = '' if math.isnan(one.late_steps) else f'; nine of ten within {one.late_steps:.0f} steps'
-    half = '' if math.isnan(one.median_steps) else f', half of them within {one.median_steps:.0f} steps'
+    late = '' if math.isnan(one.late_steps) else f'; nine of ten within {counted(round(one.late_steps), "step")}'
+    half = '' if math.isnan(one.median_steps) else f', half of them within {counted(round(one.median_steps), "step")}'
     return f'in step from every start on {100.0 * one.in_step:.0f} %{half}{late}'
 
 
@@ -294,13 +295,13 @@ def summary_lines(
 ) -> Iterator[str]:
     """Lines for a person; `seen` is what the monitor says of each."""
     yield _rig_line(task)
-    starts = len(task.phases)
-    yield f'In step: within ±{task.band_percent:g} % of 50 % at every instant, from the worst of {starts} starts.'
+    starts = counted(len(task.phases), 'start')
+    yield f'In step: within ±{task.band_percent:g} % of 50 % at every instant, from the worst of {starts}.'
     for name, found in chosen.items():
         yield ''
         yield f'{name:<16} {_coupler(task, found, parts)}'
         if recommended(found, seen[name]):
-            yield f'  {"monitor":<14} synchronized from each of {starts} starts, in as many steps'
+            yield f'  {"monitor":<14} synchronized from each of {starts}, in as many steps'
         else:
             yield f'  {"monitor":<14} NOT RECOMMENDED: not synchronized for good from each of the starts'
         for heading, content in told(task, found, parts, tolerance):

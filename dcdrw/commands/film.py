@@ -11,6 +11,7 @@ from dcdrw.trials.shots import CODECS, Files, FilmParams, film_trial
 from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.quantity import Field, Params, build, check, fields, flatten
 from dcdrw_msgs_py.rig import WheelShape
+from dcdrw_msgs_py.words import counted
 from dcdrw_sim.camera.render import LookParams
 from dcdrw_sim.camera.scene import ViewParams
 from dcdrw_sim.model.presets import PRESETS
@@ -102,8 +103,8 @@ def run(options: argparse.Namespace) -> int:
     lost = f', {filmed.lost} of them lost' if filmed.lost else ''
     end = f'; ended at {filmed.trouble}' if filmed.trouble else '; interrupted' if interrupted else ''
     print(
-        f'{filmed.frames} frames, {filmed.frames / options.fps:.1f} s of video{lost}{end}. Written: {files.video}, and '
-        f'beside it {", ".join(file.name for file in files[1:] if file.exists())}'
+        f'{counted(filmed.frames, "frame")}, {filmed.frames / options.fps:.1f} s of video{lost}{end}. '
+        f'Written: {files.video}, and beside it {", ".join(file.name for file in files[1:] if file.exists())}'
     )
     return interrupted_status(interrupted) if interrupted else 1 if filmed.trouble else 0
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from dcdrw.files import free_folder
 from dcdrw.recordings.mending import mend
 from dcdrw.recordings.recording import Recording
+from dcdrw_msgs_py.words import counted
 
 _EPILOG = """\
 The commands of this suite read a damaged recording as it is; other tools, ros2 bag play for instance, need it mended.
@@ -32,5 +33,5 @@ def run(options: argparse.Namespace) -> int:
         count = mend(recording, options.out)
         for text in recording.damage:
             print(f'dcdrw mend: left out: {text}', file=sys.stderr)
-        print(f'Written: {options.out}/ with {count} messages')
+        print(f'Written: {options.out}/ with {counted(count, "message")}')
         return 1 if recording.damage else 0

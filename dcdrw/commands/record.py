@@ -7,6 +7,7 @@ from pathlib import Path
 
 from dcdrw.console import LiveLine, domain, need
 from dcdrw.recordings.recorder import new_folder, require_libraries
+from dcdrw_msgs_py.words import counted
 
 _EPILOG = """\
 The recording is rosbag2's (MCAP): for ros2 bag info and play, Foxglove, PlotJuggler, dcdrw replay and dcdrw analyze.
@@ -60,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
         if node and node.failure:
             rclpy.shutdown()
         elif node and node.recorder:
-            line.show(f'{sum(node.recorder.counts.values())} messages, {node.recorder.size / 1e6:.1f} MB')
+            line.show(f'{counted(sum(node.recorder.counts.values()), "message")}, {node.recorder.size / 1e6:.1f} MB')
 
     namespace = ['-r', f'__ns:=/{options.namespace.strip("/")}'] if options.namespace else []
     with LiveLine() as line:

@@ -12,6 +12,7 @@ from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw_msgs_py.topics import COUPLER, FRONT_WHEEL, JOINT_STATES, REAR_WHEEL
+from dcdrw_msgs_py.words import counted
 
 _EPILOG = """\
 The samples keep the stamps that they had, and /clock goes with them: start the nodes with use_sim_time, so that they
@@ -83,7 +84,7 @@ def run(options: argparse.Namespace) -> int:
 
         def show() -> None:
             if node and node.sent:
-                line.show(f'{(node.log_ns - recording.start_ns) / 1e9:6.1f} s  {node.sent} joint states')
+                line.show(f'{(node.log_ns - recording.start_ns) / 1e9:6.1f} s  {counted(node.sent, "joint state")}')
             elif node:
                 line.show('waiting for a listener of joint_states ...')
             if node and node.done:
@@ -94,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
             status = run_node('dcdrw replay', make, ['--ros-args', *namespace])
         if node is None:
             return status
-        print(f'{node.sent} joint states sent')
+        print(f'{counted(node.sent, "joint state")} sent')
         return 0 if node.done else 130
 
 

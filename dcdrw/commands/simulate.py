@@ -8,6 +8,7 @@ import numpy as np
 
 from dcdrw.console import count, positive
 from dcdrw.files import add_force, refuse_existing, to_json, write_csv, write_text, write_whole
+from dcdrw_msgs_py.words import counted
 from dcdrw_sim.motion.cases import DEFAULT_STRIKES, Case, read_cases, run_record
 from dcdrw_sim.motion.trajectory import Run, Trajectory
 from dcdrw_sim.motion.trajectory import run as integrate
@@ -62,7 +63,10 @@ def run(options: argparse.Namespace) -> int:
     for case in cases:
         result = integrate(case.rig, case.state, strikes=options.count or case.listed_strikes)
         runs.append(result)
-        print(f'{case.name}: {len(result.strikes)} strikes in {result.duration:.6g}; {result.reason}', file=sys.stderr)
+        print(
+            f'{case.name}: {counted(len(result.strikes), "strike")} in {result.duration:.6g}; {result.reason}',
+            file=sys.stderr,
+        )
     records = [run_record(case, result) for case, result in zip(cases, runs, strict=True)]
     text = to_json(records if is_list else records[0])
     if options.strikes:

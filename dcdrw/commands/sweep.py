@@ -11,6 +11,7 @@ from dcdrw.console import Bar, add_json, check_json, cores, count, positive, tel
 from dcdrw.files import add_force
 from dcdrw.suite.parameter_file import add_rig_options, chosen_params
 from dcdrw_msgs_py.in_step import BAND_PERCENT
+from dcdrw_msgs_py.words import counted
 from dcdrw_sim.map.regression import TRIAL_PHASES
 from dcdrw_sim.study.sweep import Axis, Sweep, default_axis, default_seconds
 from dcdrw_sim.study.sweep_dataset import open_sweep, require_extra
@@ -98,7 +99,7 @@ def run(options: argparse.Namespace) -> int:
     told = ', '.join(f'{number} {name}' for name, number in verdicts.items() if number)
     tell(
         options,
-        [f'{options.out}: {sum(verdicts.values())} points: {told}'],
+        [f'{options.out}: {counted(sum(verdicts.values()), "point")}: {told}'],
         {'file': str(options.out), 'points': verdicts},
     )
     return 0

@@ -14,6 +14,7 @@ from dcdrw.suite.parameter_file import read_parameter_file
 from dcdrw_msgs_py.opencv import tag_cells
 from dcdrw_msgs_py.quantity import check
 from dcdrw_msgs_py.tagging import Mount, TagParams, mounts
+from dcdrw_msgs_py.words import counted
 
 PAPERS = {'a4': (210.0, 297.0), 'letter': (215.9, 279.4), 'a3': (297.0, 420.0), 'tabloid': (279.4, 431.8)}
 """Width and height [mm]."""
@@ -69,7 +70,7 @@ def run(options: argparse.Namespace) -> int:
         for page in pages:
             pdf.savefig(page)
     print(
-        f'Written: {options.out}, {len(pages)} page{"s" * (len(pages) > 1)} of {options.paper}. Print at 100 %: the '
+        f'Written: {options.out}, {counted(len(pages), "page")} of {options.paper}. Print at 100 %: the '
         'ruler must be 100 mm long.'
     )
     return 0

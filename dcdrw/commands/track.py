@@ -19,6 +19,7 @@ from dcdrw.trials.filmed import TrackedVideo, add_film_arguments, debug_video, j
 from dcdrw.trials.results import result, sample_file, write_results
 from dcdrw.trials.summary import summarize
 from dcdrw_msgs_py.rig import FRONT, REAR
+from dcdrw_msgs_py.words import counted
 from dcdrw_tracker.node.tag_tracker import Tracked
 
 _EPILOG = """\
@@ -97,10 +98,10 @@ def _finish(
 ) -> int:
     """Tell and write what came of it."""
     told = quality(film, frames)
-    missing = f'; {told["frames_missing"]} frames are missing' if told['frames_missing'] else ''
+    missing = f'; {counted(told["frames_missing"], "frame")} missing' if told['frames_missing'] else ''
     tags = '; '.join(
         f'{name}: tags of {told[name]["tag_size_px"]:.0f} px, {told[name]["reprojection_error_px"]:.2f} px off, '
-        f'{sum(told[name]["outliers"].values())} outliers'
+        f'{counted(sum(told[name]["outliers"].values()), "outlier")}'
         for name in (FRONT, REAR)
     )
     both = f'{told["frames_with_both_wheels"]} of {told["frames"]} frames show both wheels{missing}. {tags}'
@@ -126,12 +127,12 @@ def _finish(
 def _warnings(told: dict[str, Any]) -> Iterator[str]:
     if told['times_the_turns_were_lost']:
         yield (
-            f'the number of turns was lost {told["times_the_turns_were_lost"]} times; each time, steps are counted '
-            'afresh'
+            f'the number of turns was lost {counted(told["times_the_turns_were_lost"], "time")}; '
+            'each time, steps are counted afresh'
         )
     if told['frames_with_duplicate_tags']:
         yield (
-            f'in {told["frames_with_duplicate_tags"]} frames a tag of the rig is in the picture twice: '
+            f'in {counted(told["frames_with_duplicate_tags"], "frame")} a tag of the rig is in the picture twice: '
             'take the other one away'
         )
     for name in (FRONT, REAR):

@@ -27,6 +27,7 @@ from dcdrw_msgs_py.diagnosis import STATE, Diagnosis, Level, RecorderState, mess
 from dcdrw_msgs_py.node import Parameters, message_type, publish_diagnosis, run, steady_clock
 from dcdrw_msgs_py.quantity import fields
 from dcdrw_msgs_py.topics import SAMPLE_DEPTH, Topic
+from dcdrw_msgs_py.words import counted
 from dcdrw_msgs_py.yaml_file import yaml_text
 
 LOOK_SECONDS = 0.5
@@ -94,7 +95,7 @@ class RecorderNode(Node):
             recorder.close()
         except OSError as error:
             self.failure = _reason(error, recorder)
-        self.get_logger().info(f'{sum(recorder.counts.values())} messages in {recorder.folder}')
+        self.get_logger().info(f'{counted(sum(recorder.counts.values()), "message")} in {recorder.folder}')
 
     def destroy_node(self) -> None:
         """End the recording, then the node."""

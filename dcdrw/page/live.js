@@ -159,6 +159,7 @@ function showAge() {
   element('age').textContent = age === null ? '' : `the last sample is ${age.toFixed(age < 10 ? 1 : 0)} s old`;
 }
 
+const counted = (count, thing) => `${count} ${thing}${count === 1 ? '' : 's'}`;
 const signed = (value, digits) => (value < 0 ? '−' : '+') + Math.abs(value).toFixed(digits);
 
 function showFigures(rig) {
@@ -169,13 +170,13 @@ function showFigures(rig) {
   element('phi').textContent = known ? `${rig.phi_deg.toFixed(1)}°` : '–';
   element('goal').textContent = known && board ? `goal ${(board.pitch_deg / 2).toFixed(1)}°` : '';
   element('n').textContent = known ? signed(rig.n, 0).replace('+0', '0') : '–';
-  element('steps').textContent = known && board ? `${board.steps} steps` : '';
+  element('steps').textContent = known && board ? counted(board.steps, 'step') : '';
   element('force').textContent = known && rig.force !== null
     ? `${signed(rig.force, 1)} N, ${rig.force < 0 ? 'compression' : 'tension'}` : '[N]';
   if (!board) return;
   element('slope').textContent = `on a slope of ${(board.slope * 180 / Math.PI).toFixed(2)}°`;
   element('ratio').textContent = board.ratio === null ? '[%]' : `[%], a step leaves ${(100 * board.ratio).toFixed(0)} %`;
-  element('rate').textContent = known && board.rate ? `${board.rate} samples per second${board.left_out}` : '';
+  element('rate').textContent = known && board.rate ? `${counted(board.rate, 'sample')} per second${board.left_out}` : '';
 }
 
 const MARKS = { OK: '✓', WARN: '!', ERROR: '✕', STALE: '?' };

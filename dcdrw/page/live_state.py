@@ -24,6 +24,7 @@ from dcdrw_msgs_py.quantity import Field, fields, lookup
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
 from dcdrw_msgs_py.rolling import default_stance_distance, phi_pitch, stance, stance_distance_by_hubs
 from dcdrw_msgs_py.samples import Footfall, JointSample, PhaseSample
+from dcdrw_msgs_py.words import counted
 from dcdrw_tracker.gait.diagnostics import diagnose_sync
 from dcdrw_tracker.gait.pair_state import judge
 from dcdrw_tracker.gait.rest import moves
@@ -54,7 +55,7 @@ LATE_DATA = 'late_data'
 LONGEST_MESSAGE = 200
 """Length up to which the message of a node is shown [characters]."""
 
-_LEFT_OUT = (LOST_SAMPLES, 'missing'), (REFUSED, 'refused'), (RESTARTS, 'times begun anew')
+_LEFT_OUT = (LOST_SAMPLES, 'missing'), (REFUSED, 'refused')
 _SUITE = {node.name for node in EXECUTABLES}
 WIDEST_SLIDER = 10.0
 """Where the slider of a parameter whose default is 0 ends at most."""
@@ -311,7 +312,7 @@ class LiveState:
             state = judge(status)
         if state is PairState.CONVERGING:  # the figures beside it are younger than the node's words
             band, hold = self._params.sync.band_percent, self._params.sync.hold_steps
-            return state.value, f'until the error stays within ±{band:g} % for {hold} steps'
+            return state.value, f'until the error stays within ±{band:g} % for {counted(hold, "step")}'
         return state.value, 'the error has left the band' if state is PairState.LOST else said.message
 
     def _why_no_data(self, age: float, now: float) -> str:
@@ -384,8 +385,14 @@ class LiveState:
     def _left_out(self, now: float) -> str:
         """What the estimator says that is missing, refused or begun anew; empty where nothing is."""
         said = self._says(PHASE_ESTIMATOR.name, now)
-        counts = [(said.number(key), word) for key, word in _LEFT_OUT] if said else []
-        return ''.join(f', {count:.0f} {word}' for count, word in counts if count > 0.0)
+        if said is None:
+            return ''
+        counts = [(said.number(key), word) for key, word in _LEFT_OUT]
+        told = [f', {count:.0f} {word}' for count, word in counts if count > 0.0]
+        restarts = said.number(RESTARTS)
+        if restarts > 0.0:
+            told.append(f', begun anew {counted(f"{restarts:.0f}", "time")}')
+        return ''.join(told)
 
     def _node(self, name: str, now: float) -> dict[str, Any]:
         said, at = self._health[name]

@@ -7,6 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from dcdrw_msgs_py.words import counted
+
 LARGEST = 256 * 2**20
 """Longest chunk, and longest message, that is read [bytes]."""
 ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
@@ -65,7 +67,7 @@ def unpack_file(source: Path, target: Path) -> str:
             except OSError:
                 raise
             except Exception as error:  # of any kind, for the content may be anything
-                return f'its compressed data end in damage after {written} bytes ({error})'
+                return f'its compressed data end in damage after {counted(written, "byte")} ({error})'
             if part is None:
                 return ''
             written += len(part)

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dcdrw_msgs_py.words import counted
+
 
 class JointBatch(NamedTuple):
     """JointState messages that name the same joints; rows are messages, columns joints."""
@@ -95,7 +97,7 @@ class _Layout:
         error = (
             ''
             if positions == len(self.names)
-            else (f'{len(self.names)} joints are named but {positions} positions given')
+            else f'{counted(len(self.names), "joint name")} but {counted(positions, "position")} given'
         )
         return JointBatch(self.frame, self.names, stamp_ns, columns[0], columns[1], columns[2], error)
 

@@ -30,6 +30,7 @@ from mcap.records import (
 
 from dcdrw.recordings.bag_file import CDR, BagFile, Message, RecordedTopic
 from dcdrw.recordings.decompression import LARGEST, decompress
+from dcdrw_msgs_py.words import by_count, counted
 
 MAGIC = b'\x89MCAP0\r\n'
 _HEAD = struct.Struct('<BQ')
@@ -186,7 +187,9 @@ class McapFile(BagFile):
             cut = self._cut_chunk(at)
             if cut:
                 self._pieces.append(cut)
-        self._note(('gap', at), f'{found - at} bytes from byte {at} on are {kind}')
+        self._note(
+            ('gap', at), f'{counted(found - at, "byte")} from byte {at} on {by_count(found - at, "is", "are")} {kind}'
+        )
         return found
 
     def _find(self, at: int) -> int:
@@ -370,7 +373,7 @@ class McapFile(BagFile):
             self.start_ns, self.end_ns = start_ns, end_ns
         lost = sum(count for channel, count in self._counts.items() if channel not in self._channels)
         if lost:
-            self._note('channels', f'{lost} messages have lost the name of their topic')
+            self._note('channels', f'the name of the topic is lost of {counted(lost, "message")}')
 
     def _name_topics(self) -> None:
         for key, channel in self._channels.items():
@@ -399,7 +402,9 @@ class McapFile(BagFile):
             len(data) == piece.plain_size and (not piece.checksum or zlib.crc32(data) == piece.checksum)
         )
         if not whole:
-            self._note(('chunk', piece.record), f'the chunk at byte {piece.record} ({piece.size} bytes) is damaged')
+            self._note(
+                ('chunk', piece.record), f'the chunk at byte {piece.record} ({counted(piece.size, "byte")}) is damaged'
+            )
         at, size = 0, len(data)
         while at + _HEAD.size <= size:
             kind, length = _HEAD.unpack_from(data, at)
@@ -417,7 +422,9 @@ class McapFile(BagFile):
                 self._describe(kind, data[begin:end], lost=not whole)
             at = end
         if whole and at < size and piece.plain_size >= 0:
-            self._note(('chunk', piece.record), f'{size - at} bytes of the chunk at byte {piece.record} are damaged')
+            rest = size - at
+            text = f'{counted(rest, "byte")} of the chunk at byte {piece.record} {by_count(rest, "is", "are")} damaged'
+            self._note(('chunk', piece.record), text)
 
     def _note(self, key: Any, text: str) -> None:
         if len(self._damage) < _MOST_NOTES:

@@ -13,6 +13,7 @@ from dcdrw.recordings.bag_folder import COMPRESSIONS, find_bag
 from dcdrw.recordings.joint_batch import JointBatch, decode_joints
 from dcdrw.recordings.recorder import PARAMETERS, require_libraries
 from dcdrw_msgs_py.text_file import one_line
+from dcdrw_msgs_py.words import by_count, counted
 
 BATCH = 4096
 """Messages that are decoded at once."""
@@ -69,7 +70,10 @@ class Recording(AbstractContextManager['Recording']):
         """When the first message came, and just after the last."""
         count = sum(map(self.count, self.topics))
         if count < bag.messages and not self.damage:
-            self._lost.append(f'the metadata of {path} tell of {bag.messages} messages, {count} are there')
+            self._lost.append(
+                f'the metadata of {path} tell of {counted(bag.messages, "message")}, '
+                f'{count} {by_count(count, "is", "are")} there'
+            )
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

@@ -23,6 +23,7 @@ from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND, JointSample
 from dcdrw_msgs_py.tagging import TagParams
+from dcdrw_msgs_py.words import counted
 from dcdrw_tracker.gait.phase import PhaseParams
 from dcdrw_tracker.node.debug_image import draw
 from dcdrw_tracker.node.tag_tracker import TagTracker, Tracked
@@ -153,7 +154,7 @@ class TrackedVideo:
         status, tags = self.tracker.status(), self.params.tags
         if not status.angles.views:
             raise ValueError(self.complaint or f'{self.path}: there is no frame between --from and --to')
-        frames = f'{self.path}: in {status.angles.views} frames'
+        frames = f'{self.path}: in {counted(status.angles.views, "frame")}'
         looked = f'of family {tags.family} (family, front.ids and rear.ids in --rig)'
         if not (status.front.frames or status.rear.frames):
             front, rear = (', '.join(map(str, ids)) for ids in status.ids)

@@ -14,6 +14,7 @@ from dcdrw_msgs_py.rig import WheelShape
 from dcdrw_msgs_py.rolling import phi_pitch, steps_ahead
 from dcdrw_msgs_py.tagging import TagParams, mounts
 from dcdrw_msgs_py.topics import FRONT_WHEEL, REAR_WHEEL
+from dcdrw_msgs_py.words import counted
 from dcdrw_sim.camera.render import LookParams
 from dcdrw_sim.camera.scene import SceneParams, ViewParams
 from dcdrw_sim.camera.shutter import ShutterParams
@@ -61,7 +62,8 @@ class TruthError(NamedTuple):
     frames: int
 
     def __str__(self) -> str:
-        return f"Against the simulator's own joint states, φ is {self.phi_deg:.3f}° off (rms of {self.frames} frames)."
+        frames = counted(self.frames, 'frame')
+        return f"Against the simulator's own joint states, φ is {self.phi_deg:.3f}° off (rms of {frames})."
 
 
 def truth_error(motion: MotionTable, params: TrialParams, truth: Iterable[JointBatch]) -> TruthError | None:

@@ -10,6 +10,7 @@ from dcdrw_control.sync.safety import State
 from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND
+from dcdrw_msgs_py.words import by_count, counted
 from dcdrw_tracker.gait.diagnostics import HINTS, REFUSALS, coarseness
 from dcdrw_tracker.gait.phase import Restart
 
@@ -52,18 +53,23 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         told = dict(REFUSALS)
         told['unreadable'] = trial.unreadable or told['unreadable']
         reasons = '; '.join(
-            told[why] if count == refused else f'{count} times {told[why]}' for why, count in estimator.refusals.items()
+            told[why] if count == refused else f'{counted(count, "time")} {told[why]}'
+            for why, count in estimator.refusals.items()
         )
         of = estimator.accepted + estimator.duplicates + refused
-        yield Remark(f'{refused} of {of} joint states were refused: {reasons}.', True)
+        yield Remark(
+            f'{refused} of {counted(of, "joint state")} {by_count(refused, "was", "were")} refused: {reasons}.', True
+        )
     if cadence.lost:
         yield Remark(
-            f'By the stamps, {cadence.lost} of {trial.samples + cadence.lost} samples are missing, in '
-            f'{_number_of(cadence.gaps, "gap")} of up to {cadence.longest:.3g} s.'
+            f'By the stamps, {cadence.lost} of {trial.samples + cadence.lost} samples '
+            f'{by_count(cadence.lost, "is", "are")} missing, in '
+            f'{counted(cadence.gaps, "gap")} of up to {cadence.longest:.3g} s.'
         )
     if trial.state is PairState.SYNCHRONIZED and trial.status.steps_at_latest != trial.status.steps_to_synchronization:
         yield Remark(
-            f'A gap may hide that the error left the band later: in step after {trial.status.steps_text} steps.'
+            'A gap may hide that the error left the band later: '
+            f'in step after {counted(trial.status.steps_text, "step")}.'
         )
     faults = [one for one in stretches(trial.acts, trial.start_ns, trial.seconds) if one.state == State.FAULT.value]
     if faults:
@@ -76,11 +82,11 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         yield Remark('A gap was long enough to hide a step: n may be off.')
     if estimator.unstamped:
         yield Remark(
-            f'{_number_of(estimator.unstamped, "joint state")} had no stamp of use: '
-            'the time of recording took its place.'
+            f'{counted(estimator.unstamped, "joint state")} had no stamp of use: the time of recording took its place.'
         )
     if estimator.duplicates:
-        yield Remark(f'{_number_of(estimator.duplicates, "joint state")} came again as they were, and count once.')
+        again = by_count(estimator.duplicates, 'it was, and counts', 'they were, and count')
+        yield Remark(f'{counted(estimator.duplicates, "joint state")} came again as {again} once.')
     if estimator.disbelieved > MANY_DISBELIEVED * estimator.accepted:
         yield Remark('The speeds in the joint states do not go with the rotations: those of the rotations are used.')
     for step in estimator.clock_steps:
@@ -90,7 +96,7 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         )
     if estimator.rollovers:
         yield Remark(
-            f'The counter of an encoder rolled over {_number_of(estimator.rollovers, "time")}, which is made good.'
+            f'The counter of an encoder rolled over {counted(estimator.rollovers, "time")}, which is made good.'
         )
 
 
@@ -123,7 +129,3 @@ def _cause(restart: Restart) -> str:
         if math.isfinite(jump)
     )
     return f'its rotations jumped ({jumps}), so that they have no common zero with those before'
-
-
-def _number_of(count: int, thing: str) -> str:
-    return f'{count} {thing}{"" if count == 1 else "s"}'

@@ -8,6 +8,7 @@ from dcdrw.trials.remarks import Remark, remarks
 from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.samples import SECOND
+from dcdrw_msgs_py.words import counted
 from dcdrw_tracker.gait.phase import ClockStep, Hint, Refusal, Restart
 
 
@@ -142,18 +143,18 @@ def verdict(trial: Analysis) -> str:
     status, band = trial.status, trial.params.sync.band_percent
     start, end = 100.0 * status.initial_phase, 100.0 * status.phase
     low, high = status.final_band_percent
-    course = f'from {start:.1f} % to {end:.1f} % in {status.steps} steps'
+    course = f'from {start:.1f} % to {end:.1f} % in {counted(status.steps, "step")}'
     where = f'outside ±{band:g} % of 50 %'
     if abs(status.error_percent) <= band:
         hold = trial.params.sync.hold_steps
-        where = f'within ±{band:g} % of 50 %, but not for {hold} whole steps'
+        where = f'within ±{band:g} % of 50 %, but not for {counted(hold, "whole step")}'
     return {
         PairState.STALLED: f'From {start:.1f} %: the {" and the ".join(status.stalled)} wheel stalled after '
-        f'{status.steps} steps.',
+        f'{counted(status.steps, "step")}.',
         PairState.SLIPPED: f'A step slipped shortly before the end: {course}, n = {status.step_difference}.',
         PairState.LOST: f'Synchronization was lost: {course}, {where}.',
         PairState.SYNCHRONIZED: f'From {start:.1f} % to within ±{band:g} % of 50 % of a step (25 % of a stride) in '
-        f'{status.steps_text} steps; in the last ones {50 + low:.1f} to {50 + high:.1f} %.',
+        f'{counted(status.steps_text, "step")}; in the last ones {50 + low:.1f} to {50 + high:.1f} %.',
         PairState.CONVERGING: f'Not synchronized: {course}, {where}.',
     }[trial.state]
 

@@ -24,6 +24,7 @@ from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.text_file import read_rows
 from dcdrw_msgs_py.topics import SIDES
 from dcdrw_msgs_py.values import Floats
+from dcdrw_msgs_py.words import counted
 
 FASTEST = 35.0
 """No leg turns faster [rad/s], and gyroscopes end at 2000 degrees per second: a file with larger rates is in deg/s."""
@@ -108,7 +109,7 @@ def _read(path: Path) -> tuple[list[str], Floats]:
     table: list[list[float]] = []
     for line, row in lines[len(heads) :]:
         if len(row) != len(names):
-            raise ValueError(f'{path}, line {line}: {len(row)} cells, not {len(names)} as in the first row')
+            raise ValueError(f'{path}, line {line}: {counted(len(row), "cell")}, not {len(names)} as in the first row')
         wrong = next((cell for cell in row if cell and not _is_number(cell)), None)
         if wrong is not None:
             raise ValueError(f'{path}, line {line}: {wrong!r} is not a number')

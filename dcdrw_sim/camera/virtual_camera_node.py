@@ -13,6 +13,7 @@ from dcdrw_msgs_py.node import Age, Parameters, advertise, follow_runs, listen, 
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.tagging import TagParams
 from dcdrw_msgs_py.topics import CAMERA_INFO, IMAGE_RAW, JOINT_STATES
+from dcdrw_msgs_py.words import counted
 from dcdrw_sim.camera.render import LookParams, Renderer
 from dcdrw_sim.camera.scene import Footing, SceneParams, ViewParams
 from dcdrw_sim.camera.shutter import Shutter, ShutterParams
@@ -105,7 +106,7 @@ class VirtualCameraNode(Node):
         if dropped > MANY_DROPPED * drawn:
             return Diagnosis(
                 Level.WARN,
-                f'{dropped} frames dropped since the last report: drawing is slower than '
+                f'{counted(dropped, "frame")} dropped since the last report: drawing is slower than '
                 'frame_rate, or joint_states come more rarely',
                 values,
             )

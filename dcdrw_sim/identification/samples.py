@@ -8,6 +8,7 @@ import numpy as np
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.rolling import stance
 from dcdrw_msgs_py.values import Floats
+from dcdrw_msgs_py.words import counted
 
 AT_REST = 1.0
 """A wheel that turns by less than STILL in so long is at rest [s]."""
@@ -74,7 +75,7 @@ def free_rolling(rig: RigParams, seconds: Floats, rotations: Floats) -> Samples:
     spokes, thetas = (np.stack(columns, axis=1) for columns in zip(*of_wheels, strict=True))
     calm = np.flatnonzero((np.abs(thetas[:end]) < alphas - AWAY).all(axis=1))
     if not calm.size or end - calm[0] < FEWEST:
-        raise ValueError(f'both wheels roll in {max(end, 0)} samples only: nothing can be told of them')
+        raise ValueError(f'both wheels roll in {counted(max(end, 0), "sample")} only: nothing can be told of them')
     first = int(calm[0])
     ahead = spokes[:, 0] - spokes[:, 1] - (spokes[0, 0] - spokes[0, 1])
     behind = thetas[0, 0] / (2.0 * alphas[0]) < thetas[0, 1] / (2.0 * alphas[1])  # p in [0, 1): the front is to strike

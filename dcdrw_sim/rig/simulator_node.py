@@ -26,6 +26,7 @@ from dcdrw_msgs_py.topics import (
     RUNS,
     Topic,
 )
+from dcdrw_msgs_py.words import counted
 from dcdrw_sim.motion.ends import MotionError, accept
 from dcdrw_sim.rig.simulator import SimulatedRig, SimulatorParams, Timeline
 
@@ -79,7 +80,7 @@ class SimulatorNode(Node):
         self._timer = self.create_timer(self._period(), self._tick, clock=steady_clock())
         self._restart()
         doing = 'holding the wheels' if self._paused else 'rolling'
-        self.get_logger().info(f'{doing}, {params.rate:g} samples per second')
+        self.get_logger().info(f'{doing}, {counted(f"{params.rate:g}", "sample")} per second')
 
     def _now(self) -> float:
         return float(self._pace_clock.now().nanoseconds) / SECOND

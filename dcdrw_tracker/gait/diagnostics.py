@@ -26,6 +26,7 @@ from dcdrw_msgs_py.diagnosis import (
     PairState,
     Value,
 )
+from dcdrw_msgs_py.words import counted
 from dcdrw_tracker.gait.cadence import CadenceStatus
 from dcdrw_tracker.gait.pair_state import judge
 from dcdrw_tracker.gait.phase import Hint, PhaseStatus, Refusal
@@ -127,7 +128,7 @@ def _message(state: PairState, status: SyncStatus, age: float) -> str:
         PairState.STALLED: f'stalled: the {" and the ".join(status.stalled)} wheel does not strike any more',
         PairState.SLIPPED: f'slipped a step: n = {status.step_difference}',
         PairState.LOST: f'lost synchronization: error {status.error_percent:+.1f} %',
-        PairState.SYNCHRONIZED: f'synchronized after {status.steps_text} steps',
+        PairState.SYNCHRONIZED: f'synchronized after {counted(status.steps_text, "step")}',
         PairState.CONVERGING: f'converging: error {status.error_percent:+.1f} %',
     }[state]
 

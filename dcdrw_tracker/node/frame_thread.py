@@ -8,6 +8,7 @@ from typing import Any, Generic, TypeVar
 
 from dcdrw_msgs_py.frame import Frame
 from dcdrw_msgs_py.samples import SECOND
+from dcdrw_msgs_py.words import counted
 from dcdrw_tracker.node.video import VideoFile
 
 RETRY_SECONDS = 1.0
@@ -111,7 +112,7 @@ class FrameThread:
         except ValueError as error:
             self._say(str(error), False)
             return
-        self._say(video.complaint or f'the video has ended after {video.read} frames', not video.complaint)
+        self._say(video.complaint or f'the video has ended after {counted(video.read, "frame")}', not video.complaint)
 
     def _film(self, open_camera: Callable[[], Any], name: str) -> None:
         while not self._end.is_set():

@@ -16,6 +16,7 @@ from scipy.optimize import minimize_scalar
 from dcdrw_msgs_py.rig import FRONT, REAR, WheelShape
 from dcdrw_msgs_py.rolling import stance, step_length
 from dcdrw_msgs_py.values import Floats
+from dcdrw_msgs_py.words import counted
 from dcdrw_tracker.tags.view_plane import PlaneAxes
 from dcdrw_tracker.tags.wheel_view import PairView
 
@@ -171,7 +172,7 @@ def _calibrate(name: str, views: Sequence[PairView], shape: WheelShape) -> Wheel
     steps = int(np.ptp(cells))
     if steps < LEAST_STEPS:
         raise ValueError(
-            f'the {name} wheel takes {steps} steps before the camera, but {LEAST_STEPS} are needed: film '
+            f'the {name} wheel takes {counted(steps, "step")} before the camera, but {LEAST_STEPS} are needed: film '
             'a longer way, from further off or with a wider lens'
         )
     found = path.solve(alpha, zero)
@@ -202,7 +203,7 @@ def _check(name: str, path: _Path, shape: WheelShape, steps: int, found: Floats)
     went, rolled = float(np.ptp(path.hub.real)), steps * shape.step_length
     if not 0.5 < went / rolled < 2.0:
         raise ValueError(
-            f'the hub of the {name} wheel travels {went:.2f} m in {steps} steps, not about {rolled:.2f} '
+            f'the hub of the {name} wheel travels {went:.2f} m in {counted(steps, "step")}, not about {rolled:.2f} '
             f'm: the camera must stand still, not follow the pair; else see size and {name}.length'
         )
     misfit = path.misfit(shape.alpha, path.best_zero(shape.alpha))

@@ -105,7 +105,7 @@ def test_reader_follows_a_source_that_changes_its_order():
     [
         ([], [], 'joint front_wheel is missing; the message names none'),
         (['front_wheel', 'Rear'], [1.0, 2.0], 'joint rear_wheel is missing; the message names front_wheel, Rear'),
-        (['front_wheel', 'rear_wheel'], [1.0], '2 joints are named but 1 positions given'),
+        (['front_wheel', 'rear_wheel'], [1.0], '2 joint names but 1 position given'),
         (['front_wheel', 'rear_wheel', 'rear_wheel'], [1.0, 2.0, 3.0], 'joint rear_wheel stands twice'),
     ],
 )

@@ -38,7 +38,7 @@ def test_hips_are_found_by_name_in_any_order_and_company():
     [
         (joints(['knee'], [1.0]), 'none of the hips'),
         (joints([HIPS[0], HIPS[0]], [1.0, 1.0]), 'named once'),
-        (joints([HIPS[0]], []), '1 joints are named but 0 positions'),
+        (joints([HIPS[0]], []), '1 joint name but 0 positions given'),
     ],
 )
 def test_a_message_without_a_hip_says_why(message, told):

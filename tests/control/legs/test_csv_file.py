@@ -62,7 +62,7 @@ def test_a_file_of_one_leg_names_no_side_and_needs_no_time_where_the_rate_is_giv
         ('time,left_force\n', 'there should be some'),
         ('time,speed\n0,1\n1,2\n', 'no column of a leg'),
         ('time,left_force\n0,1\n1,two\n', "line 3: 'two' is not a number"),
-        ('time,left_force\n0,1\n1\n', 'line 3: 1 cells, not 2 as in the first row'),
+        ('time,left_force\n0,1\n1\n', 'line 3: 1 cell, not 2 as in the first row'),
         ('time,left_force\n0,1\ninf,2\n', 'a time in column time is none'),
         ('time,left_force\n0,1\n1e30,2\n', 'a time in column time is none'),
         ('time;left_force\n0;1\n1;2\n', 'should have commas between them'),

@@ -282,6 +282,9 @@ def test_what_is_missing_and_refused_is_said_beside_the_rate():
     counts = {LOST_SAMPLES: 4, REFUSED: '3', RESTARTS: 0}
     state.take_health('phase_estimator', Diagnosis(Level.OK, '', counts), 1.0)
     assert state.frame(1.0)['board']['left_out'] == ', 4 missing, 3 refused'
+    for restarts, told in ((1, ', begun anew 1 time'), (2, ', begun anew 2 times')):
+        state.take_health('phase_estimator', Diagnosis(Level.OK, '', {RESTARTS: restarts}), 2.0)
+        assert state.frame(2.0)['board']['left_out'] == told
 
 
 def test_strangers_push_out_none_of_the_suite_and_take_little_room():

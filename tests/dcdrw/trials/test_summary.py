@@ -261,6 +261,14 @@ def test_joint_states_that_come_twice_cost_nothing():
     assert summary.steps_to_synchronization == summarize(trial(WALK)).steps_to_synchronization
 
 
+def test_of_one_of_a_kind_it_is_said_in_the_singular():
+    odd = [*WALK[:3000], WALK[2999], *WALK[3001:3010], WALK[3010]._replace(front=Turn(math.nan, 0.0)), *WALK[3011:]]
+    said = summarize(trial(odd)).sentence
+    assert '1 of 4000 joint states was refused: a rotation' in said
+    assert 'samples are missing, in 2 gaps' in said
+    assert '1 joint state came again as it was, and counts once.' in said
+
+
 def test_rotations_in_revolutions_bring_a_hint_at_the_unit():
     turns = [
         sample._replace(

@@ -1,0 +1,17 @@
+"""Numbers in sentences."""
+
+
+def counted(count: object, thing: str) -> str:
+    """So many of a thing: `1 step`, `2 steps`, `37 to 38 steps`.
+
+    Args:
+        count: a whole number, or text that tells one.
+        thing: the noun, in the singular; its plural ends in one more s.
+
+    """
+    return f'{count} {thing}{"" if str(count) == "1" else "s"}'
+
+
+def by_count(count: float, one: str, more: str) -> str:
+    """The words that go with so many: `is` or `are`."""
+    return one if count == 1 else more
