@@ -18,7 +18,7 @@ _EPILOG = """\
 A recording is the folder of one, or that of a trial, or a file of one (.mcap or .db3, compressed or not), by this suite
 or by ros2 bag record.
 The parameters are those that were recorded, or the defaults, and what --rig changes. Without --out, nothing is
-written. Exit status: 0 each was judged by all that it holds, 1 a verdict rests on less, or nothing was run (the
+written. Exit status: 0 each was judged by all that it holds, 1 a verdict rests on less, or there is none (the
 sentence says why), or one of several could not be read, 2 wrong input, 3 one did not end as --expect says.
 """
 

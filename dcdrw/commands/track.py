@@ -32,7 +32,7 @@ footfalls.csv and a recording (for ros2 bag, dcdrw replay, analyze and report), 
   frames.csv   each frame: stamp_ns; run, ψ and ω of both wheels (SI units, radians) where both were measured; of each
                wheel tags seen, reprojection error, and the hub's place x downhill and y along the slope's normal
 Ctrl-C ends the tracking and keeps what was tracked. Exit status: 0 judged by all that was filmed, 1 the verdict
-rests on less or nothing was run (the sentence says why), or the video is truncated (what came before is kept), 2 wrong
+rests on less or there is none (the sentence says why), or the video is truncated (what came before is kept), 2 wrong
 input, 3 it did not end as --expect says, 130 interrupted.
 """
 

@@ -16,11 +16,13 @@ from dcdrw.trials.acts import Acts
 from dcdrw.trials.course import Course, Gap
 from dcdrw.trials.motion import MotionTable, Sink
 from dcdrw_msgs_py.diagnosis import PairState
+from dcdrw_msgs_py.in_step import strikes_in_step
 from dcdrw_msgs_py.rig import FRONT
 from dcdrw_msgs_py.rolling import phi_pitch
 from dcdrw_msgs_py.samples import SECOND, CouplerSample, Footfall, JointSample, PhaseSample, Turn
 from dcdrw_msgs_py.text_file import one_line
 from dcdrw_msgs_py.values import Floats
+from dcdrw_msgs_py.words import counted
 from dcdrw_tracker.gait.cadence import CadenceStatus
 from dcdrw_tracker.gait.pair_state import judge
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseStatus
@@ -117,6 +119,18 @@ class Analysis(NamedTuple):
         return self.state not in (PairState.NO_DATA, PairState.HELD)
 
     @property
+    def why_not_judged(self) -> str:
+        """Why there is no verdict on a trial that ran; empty where there is one.
+
+        It takes as many strikes as make a pair synchronized that is in step throughout. What a wheel was seen to do
+        amiss in fewer is a verdict.
+        """
+        steps, hold = self.status.steps, self.params.sync.hold_steps
+        if self.state is not PairState.CONVERGING or strikes_in_step(0, steps) >= hold:
+            return ''
+        return f'{counted(steps, "step")} of the {hold} that a verdict takes'
+
+    @property
     def why_not_run(self) -> str:
         """What was there in the place of a trial; empty where it ran."""
         if self.state is PairState.HELD:
@@ -125,6 +139,8 @@ class Analysis(NamedTuple):
             return ''
         if self.unreadable:
             return f'no joint state could be read: {self.unreadable}'
+        if self.samples:
+            return 'a single joint state was of use'
         return 'no joint state was of use' if self.joint_states else 'there are no joint states'
 
 

@@ -178,17 +178,22 @@ _VERDICTS = {
     PairState.CONVERGING: ('not synchronized', 'bad'),
 }
 """What each state at the end of a trial means, and the class of the cell that says so."""
+_TOO_LITTLE = 'too little to judge', 'none'
+
+
+def _words(trial: RecordedTrial) -> tuple[str, str]:
+    return _TOO_LITTLE if trial.analysis.why_not_judged else _VERDICTS[trial.summary.state]
 
 
 def _verdict(trial: RecordedTrial) -> str:
-    words, kind = _VERDICTS[trial.summary.state]
-    less = '' if trial.summary.complete or not trial.analysis.ran else ', of a part'
+    words, kind = _words(trial)
+    less = '' if trial.summary.complete or trial.summary.reason else ', of a part'
     return f'<span class="{kind}">{words}</span>{less}'
 
 
 def _sentence(trial: RecordedTrial) -> str:
     """The verdict in large print, its first words as in the table."""
-    words, kind = _VERDICTS[trial.summary.state]
+    words, kind = _words(trial)
     sentence = verdict(trial.analysis)
     if sentence.lower().startswith(words):
         return f'<span class="{kind}">{sentence[: len(words)]}</span>{html.escape(sentence[len(words) :])}'

@@ -38,7 +38,7 @@ class Samples(NamedTuple):
 
 
 class Summary(NamedTuple):
-    """Everything that a program wants to know of a trial. What no trial was run for is None."""
+    """Everything that a program wants to know of a trial. What the trial does not tell is None."""
 
     sentence: str
     state: PairState
@@ -86,15 +86,15 @@ def summarize(trial: Analysis) -> Summary:
     status, state = trial.status, trial.state
     synchronized = state is PairState.SYNCHRONIZED
     low, high = status.final_band_percent
-    said = remarks(trial)
+    said, judged = remarks(trial), trial.ran and not trial.why_not_judged
     return Summary(
         sentence=sentence(trial),
         state=state,
-        reason=trial.why_not_run or None,
+        reason=trial.why_not_run or trial.why_not_judged or None,
         remarks=said,
-        complete=trial.ran and not trial.damage and not any(remark.rests_on_less for remark in said),
+        complete=judged and not trial.damage and not any(remark.rests_on_less for remark in said),
         judged_from_s=(trial.resumed.stamp_ns - trial.start_ns) / SECOND if trial.resumed else 0.0,
-        synchronized=synchronized if trial.ran else None,
+        synchronized=synchronized if judged else None,
         initial_phase_percent=_known(100.0 * status.initial_phase),
         final_phase_percent=_known(100.0 * status.phase),
         final_phase_percent_of_stride=_known(50.0 * status.phase),
@@ -142,6 +142,8 @@ def verdict(trial: Analysis) -> str:
         return f'Not run: {trial.why_not_run}.'
     status, band = trial.status, trial.params.sync.band_percent
     start, end = 100.0 * status.initial_phase, 100.0 * status.phase
+    if trial.why_not_judged:
+        return f'Too little to judge: {trial.why_not_judged}, from {start:.1f} % to {end:.1f} %.'
     low, high = status.final_band_percent
     course = f'from {start:.1f} % to {end:.1f} % in {counted(status.steps, "step")}'
     where = f'outside ±{band:g} % of 50 %'

@@ -227,3 +227,12 @@ def test_the_verdict_for_a_program_and_as_a_status(tmp_path, capsys, motion):
     assert main(['analyze', '--expect', 'stalled', str(tmp_path / 'bag')]) == UNEXPECTED
     assert main(['analyze', '--json', str(tmp_path / 'both.json'), *[str(tmp_path / 'bag')] * 2]) == 0
     assert [one['state'] for one in json.loads((tmp_path / 'both.json').read_text())] == ['synchronized'] * 2
+
+
+@pytest.mark.parametrize(
+    ('count', 'words'), [(1, 'Not run: a single joint state'), (2, 'Too little to judge: 0 steps')]
+)
+def test_a_recording_of_too_few_samples_is_not_judged(count, words, tmp_path, capsys, motion):
+    write_bag(tmp_path / 'bag', list(messages(motion[1]))[:count])
+    assert main(['analyze', '--expect', 'converging', str(tmp_path / 'bag')]) == 1
+    assert capsys.readouterr().out.startswith(words)

@@ -145,6 +145,49 @@ def test_a_trial_that_ends_within_the_band_too_early_is_not_said_to_be_outside()
     assert 'within ±6 % of 50 %, but not for 3 whole steps' in summary.sentence
 
 
+def ended(strikes: int) -> list[JointSample]:
+    """A trial that starts in step, and ends just after so many strikes of the front wheel."""
+    samples = walk(5.0, p0=0.52).samples()
+    falls = [fall.stamp_ns for fall in trial(samples).footfalls if fall.wheel == 'front']
+    return [sample for sample in samples if sample.stamp_ns < falls[strikes - 1] + SECOND // 50]
+
+
+@pytest.mark.parametrize(
+    ('samples', 'steps'),
+    [
+        (WALK[:2], '0 steps'),
+        (WALK[:3], '0 steps'),
+        (WALK[:100], '0 steps'),
+        (ended(1), '1 step'),
+        (ended(2), '2 steps'),
+    ],
+)
+def test_fewer_strikes_than_could_make_a_pair_synchronized_are_too_little_to_judge(samples, steps):
+    summary = summarize(trial(samples))
+    assert (summary.state, summary.synchronized, summary.complete) == (PairState.CONVERGING, None, False)
+    assert summary.reason == f'{steps} of the 3 that a verdict takes'
+    assert summary.sentence.startswith(f'Too little to judge: {summary.reason}, from ')
+
+
+def test_as_many_strikes_as_the_rule_needs_are_enough_either_way():
+    near = summarize(trial(ended(3)))
+    assert (near.state, near.steps_to_synchronization, near.complete) == (PairState.SYNCHRONIZED, 0, True)
+    far = summarize(trial(WALK[:450]))
+    assert (far.front_steps, far.synchronized, far.reason, far.complete) == (3, False, None, True)
+    params = TrialParams(sync=SyncParams(hold_steps=4))
+    assert not summarize(analyze([batch(WALK[:450])], params)).complete
+
+
+def test_wheels_that_stall_in_their_first_step_are_judged():
+    first = ended(1)[-1]
+    stands = [
+        first._replace(stamp_ns=first.stamp_ns + i * SECOND // RATE, front=Turn(first.front.angle + 0.03 * math.sin(i)))
+        for i in range(1, 4 * RATE)
+    ]
+    summary = summarize(trial([*ended(1), *stands]))
+    assert (summary.state, summary.reason) == (PairState.STALLED, None)
+
+
 def test_wheels_that_were_held_throughout_have_no_verdict(tmp_path):
     summary = summarize(trial(held(5.0)))
     assert (summary.state, summary.synchronized, summary.steps_to_synchronization) == (PairState.HELD, None, None)
@@ -285,7 +328,7 @@ def test_rotations_in_revolutions_bring_a_hint_at_the_unit():
 def test_a_single_sample_of_use_is_no_trial():
     stuck = [sample._replace(stamp_ns=WALK[0].stamp_ns) for sample in WALK]
     summary = summarize(trial(stuck))
-    assert (summary.state, summary.reason) == (PairState.NO_DATA, 'no joint state was of use')
+    assert (summary.state, summary.reason) == (PairState.NO_DATA, 'a single joint state was of use')
 
 
 def test_wheels_that_roll_uphill_bring_a_hint_at_the_sign():
