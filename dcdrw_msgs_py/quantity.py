@@ -82,6 +82,8 @@ class Field(NamedTuple):
                 raise ValueError(f'{self.name} must be {self.requirement}, got {value!r}{self._question(value)}')
             if self.kind is int and value != int(value):
                 raise ValueError(f'{self.name} must be a whole number, got {value!r}')
+            if self.kind is int and not -(2**63) <= int(value) < 2**63:
+                raise ValueError(f'{self.name} must be a whole number of 64 bits, as ROS has them, got {value!r}')
             return self._chosen(self.kind(value))
         if self.kind in (bool, str) and isinstance(value, self.kind):
             return self._chosen(value)

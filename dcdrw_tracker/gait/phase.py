@@ -61,7 +61,10 @@ class PhaseParams(NamedTuple):
         0.5
     )
     restart_samples: Annotated[
-        int, Quantity('refused samples in a row that agree, and so make a restart of the source', low=2, live=True)
+        int,
+        Quantity(
+            'refused samples in a row that agree, and so make a restart of the source', low=2, high=1000, live=True
+        ),
     ] = 5
     unit: Annotated[
         str, Quantity('unit of the rotations in joint_states; of the speeds, the same per second', choices=tuple(UNITS))

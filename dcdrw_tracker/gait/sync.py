@@ -54,7 +54,10 @@ class SyncParams(NamedTuple):
         ),
     ] = 1.0
     hold_steps: Annotated[
-        int, Quantity('strikes of the front wheel within the band that make it synchronized', low=1, live=True)
+        int,
+        Quantity(
+            'strikes of the front wheel within the band that make it synchronized', low=1, high=HISTORY, live=True
+        ),
     ] = HOLD_STEPS
     stale_after: Annotated[
         float,

@@ -63,7 +63,7 @@ class TrackParams(NamedTuple):
         float, Quantity('a view whose reprojection error is larger is an outlier', 'px', above=0.0, live=True)
     ] = 3.0
     relock_views: Annotated[
-        int, Quantity('outliers in a row that agree, and so are the truth', low=START_VIEWS, live=True)
+        int, Quantity('outliers in a row that agree, and so are the truth', low=START_VIEWS, high=1000, live=True)
     ] = 10
 
 

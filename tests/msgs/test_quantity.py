@@ -97,6 +97,10 @@ def test_a_list_may_come_as_any_sequence_of_numbers(ids):
     assert [type(value) for value in params.ids + params.sizes] == [int, int, float, float]
 
 
+def test_a_whole_number_may_be_as_large_as_ros_has_them():
+    assert build(Outer, {'ids': [2**63 - 1]}).ids == (2**63 - 1,)
+
+
 @pytest.mark.parametrize('nothing', [[], (), None])
 def test_a_list_may_be_empty(nothing):
     assert build(Outer, {'ids': nothing}).ids == ()
@@ -109,6 +113,8 @@ def test_a_list_may_be_empty(nothing):
         ({'ids': '34'}, "ids must be a list, got '34'"),
         ({'ids': [3, -1]}, r'ids\[1\] must be ≥ 0, got -1'),
         ({'ids': [3, 0.5]}, r'ids\[1\] must be a whole number, got 0\.5'),
+        ({'ids': [2**63]}, r'ids\[0\] must be a whole number of 64 bits, as ROS has them, got 9223372036854775808'),
+        ({'ids': [1e20]}, r'ids\[0\] must be a whole number of 64 bits, as ROS has them, got 1e\+20'),
         ({'ids': [True]}, r'ids\[0\] must be a whole number, got True'),
         ({'sizes': [1.0, 'x']}, r"sizes\[1\] must be a number, got 'x'"),
         ({'sizes': [0.0]}, r'sizes\[0\] must be > 0 m, got 0'),

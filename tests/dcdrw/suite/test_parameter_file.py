@@ -95,6 +95,7 @@ def test_the_only_namespace_of_a_file_is_taken(tmp_path):
         ('rig_1: {}', 'is not a parameter file'),
         ('"a\\nb": {ros__parameters: {}}', r'for a\\nb, which no trial has'),
         ('rig_1: {"**": {ros__parameters: {}}}\nrig_1/**: {ros__parameters: {}}', r'has rig_1/\*\* twice'),
+        ('/**: {ros__parameters: {hold_steps: 99999999999999999999}}', 'hold_steps must be ≥ 1, ≤ 10000, got 1e'),
         ('/**: {ros__parameters: {a: {b: 1}, a.b: 2}}', r'has a.b twice \(for /\*\*\)'),
     ],
 )
