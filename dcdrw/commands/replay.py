@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dcdrw.console import LiveLine, need, number, positive
 from dcdrw.recordings.bag_file import Message
-from dcdrw.recordings.derived_joints import as_messages, derived_joints
+from dcdrw.recordings.derived_joints import as_messages, derived_joints, joint_topic
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
@@ -119,7 +119,7 @@ def _joints(options: argparse.Namespace, recording: Recording) -> tuple[str, Cal
         return as_messages(*made, begin_ns) if made else recording.messages([topic], begin_ns, end_ns)
 
     made = derived()
-    topic = made[0] if made else recording.find(options.topic, namespace=options.namespace)
+    topic = made[0] if made else joint_topic(recording, options.topic, options.namespace)
     return topic, messages
 
 

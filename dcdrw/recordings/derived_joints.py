@@ -14,7 +14,8 @@ from dcdrw.suite.parameter_file import read_parameter_file
 from dcdrw_control.legs.params import LegParams
 from dcdrw_control.legs.walk import leg_updates
 from dcdrw_msgs_py.samples import JointSample, Turn
-from dcdrw_msgs_py.topics import FRONT_POSE, JOINT_STATES
+from dcdrw_msgs_py.text_file import one_line
+from dcdrw_msgs_py.topics import FRONT_POSE, JOINT_STATES, REAR_POSE
 from dcdrw_tracker.gait.phase import PhaseParams
 
 
@@ -62,6 +63,34 @@ def derived_joints(
     readings = leg_readings(recording, params.hip_joints, namespace, window)
     batches = _of_both(wheel_batches(leg_updates(readings, params)), recording, legs)
     return f'{namespace_of(legs[0])}/{topic}', batches
+
+
+def joint_topic(recording: Recording, topic: str, namespace: str = '') -> str:
+    """The topic of the joint states that were recorded.
+
+    Raises:
+        ValueError: there is none, or one in several namespaces; what poses were recorded in its place is told.
+
+    """
+    poses = [f'{one_line(name)} ({kind})' for name, kind in recording.types.items() if kind in _POSES]
+    try:
+        return recording.find(topic, namespace=namespace)
+    except ValueError as error:
+        if not poses or recording.found(topic, namespace=namespace):
+            raise
+        raise ValueError(
+            f'{error}; poses of the wheels would do, as {FRONT_POSE.name} and {REAR_POSE.name} of {FRONT_POSE.type}: '
+            f'it has {", ".join(poses)}'
+        ) from None
+
+
+_POSES = {
+    FRONT_POSE.type,
+    *(f'geometry_msgs/msg/{kind}' for kind in ('Pose', 'PoseWithCovarianceStamped', 'TransformStamped')),
+    'nav_msgs/msg/Odometry',
+    'tf2_msgs/msg/TFMessage',
+}
+"""Types of messages that tell where a body is."""
 
 
 def _of_both(batches: Iterator[JointBatch], recording: Recording, legs: list[str]) -> Iterator[JointBatch]:

@@ -8,7 +8,7 @@ from typing import Any
 from dcdrw.console import Bar
 from dcdrw.drawings.figure_files import figure_files
 from dcdrw.files import Table, table_file, to_json, write_csv, write_text, write_whole
-from dcdrw.recordings.derived_joints import derived_joints
+from dcdrw.recordings.derived_joints import derived_joints, joint_topic
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.recorded_runs import recorded_runs, with_runs
 from dcdrw.recordings.recording import Recording
@@ -151,7 +151,7 @@ def _joint_states(
     derived = derived_joints(recording, topic, rig, namespace)
     if derived:
         return derived
-    name = recording.find(topic, namespace=namespace)
+    name = joint_topic(recording, topic, namespace)
     batches = with_runs(recording.joints(name), recorded_runs(recording, name))
     return name, _shown(batches, recording.count(name))
 

@@ -9,7 +9,7 @@ from dcdrw.cli import main
 from dcdrw.trials.results import read_trial
 from dcdrw.trials.summary import summarize
 from dcdrw_msgs_py.topics import FRONT_POSE, REAR_POSE
-from tests.bags import TYPES
+from tests.bags import JOINT_STATE, TYPES
 from tests.tracker.walking import ALPHA, PITCH, START_NS, walk
 from tests.tracker.wheels.test_poses import streams, y_up
 
@@ -104,3 +104,36 @@ def test_of_the_poses_of_two_rigs_those_asked_for_are_judged(tmp_path, capsys):
         '/rig_1/**: {ros__parameters: {band_percent: 7.0}}\n/rig_2/**: {ros__parameters: {band_percent: 8.0}}\n'
     )
     assert read_trial(bag, rig=rig, namespace='rig_2')[0].params.sync.band_percent == 8.0
+
+
+@pytest.mark.parametrize(
+    'types',
+    [
+        ['geometry_msgs/msg/PoseWithCovarianceStamped'] * 2,
+        ['nav_msgs/msg/Odometry'] * 2,
+        ['geometry_msgs/msg/TransformStamped'] * 2,
+        ['tf2_msgs/msg/TFMessage'],
+        [FRONT_POSE.type],
+    ],
+)
+def test_of_poses_that_are_not_taken_it_is_told_how_they_would_be(types, tmp_path, capsys):
+    topics = ('/mocap/front', '/mocap/rear')
+    with Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        for topic, kind in zip(topics, types, strict=False):
+            writer.write(writer.add_connection(topic, kind, typestore=TYPES), START_NS, b'\0\1\0\0')
+    told = ', '.join(f'{topic} ({kind})' for topic, kind in zip(topics, types, strict=False))
+    for command in ('analyze', 'replay'):
+        assert main([command, str(tmp_path / 'bag')]) == 2
+        assert capsys.readouterr().err.endswith(
+            'of this type it has: none; poses of the wheels would do, as front_pose and rear_pose of '
+            f'geometry_msgs/msg/PoseStamped: it has {told}\n'
+        )
+
+
+def test_of_joint_states_in_several_suites_poses_tell_nothing(tmp_path, capsys):
+    with Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        kinds = {'/a/joint_states': JOINT_STATE, '/b/joint_states': JOINT_STATE, '/tf': 'tf2_msgs/msg/TFMessage'}
+        for topic, kind in kinds.items():
+            writer.write(writer.add_connection(topic, kind, typestore=TYPES), START_NS, b'\0\1\0\0')
+    assert main(['analyze', str(tmp_path / 'bag')]) == 2
+    assert capsys.readouterr().err.endswith('choose one with --namespace /a or /b\n')
