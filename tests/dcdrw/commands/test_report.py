@@ -161,6 +161,20 @@ def test_what_was_not_run_is_listed_as_such_and_not_drawn(tmp_path, capsys):
     assert (tmp_path / 's.html').read_text().count('<svg') == 4
 
 
+def test_a_trial_without_a_strike_is_no_failure_and_no_success(tmp_path, capsys):
+    names = ('front_wheel', 'rear_wheel')
+    bag = write_bag(
+        tmp_path / 'bag',
+        [(10**18 + i * 10**7, joint_state(10**18 + i * 10**7, names, (0.01 * i, 0.1 + 0.01 * i))) for i in range(9)],
+    )
+    path = tmp_path / 'r.html'
+    assert main(['report', str(bag), '--out', str(path)]) == 1
+    assert 'Too little to judge: 0 steps of the 3 that a verdict takes' in capsys.readouterr().out
+    assert '<span class="none">too little to judge</span>' in path.read_text()
+    (trial,) = rows(path, 'trials.csv')
+    assert (trial['state'], trial['synchronized'], trial['complete']) == ('converging', '', 'False')
+
+
 def test_each_trial_tells_its_gaps(tmp_path):
     bag = measured_bag(tmp_path / 'bag', 0.3, gap=(4.0, 4.5))
     path = tmp_path / 'r.html'
