@@ -5,6 +5,7 @@ import runpy
 import shlex
 import shutil
 from configparser import ConfigParser
+from glob import glob
 from itertools import pairwise
 
 import pytest
@@ -17,9 +18,12 @@ from dcdrw.suite.tables import updated
 from dcdrw_msgs_py.quantity import fields
 from tests import ROOT
 from tests.snippets import ELSEWHERE, PAGES, blocks, commands, inline, targets
+from tests.trials import STIFF
 
 QUICK = {'legs', 'map', 'simulate', 'tags', 'urdf'}
 """Commands that are run as they stand in the docs. Of the others the arguments are read; their own tests run them."""
+ON_TRIALS = {'analyze', 'control', 'mend', 'models', 'report'}
+"""Likewise, where `trials` and recordings lie that were made before."""
 NODES = {node.name: {field.name for params in node.parameters for field in fields(params)} for node in EXECUTABLES}
 TOPICS = {topic.name.lstrip('/'): topic.type for node in EXECUTABLES for topic in (*node.subscribes, *node.publishes)}
 SERVICES = {
@@ -105,6 +109,21 @@ def test_quick_commands_of_a_page_run(page, tmp_path, monkeypatch, capsys):
     for snippet, words in STANDING:
         if snippet.page == page and words[0] == 'dcdrw' and words[1] in QUICK:
             assert main(words[1:]) == 0, (str(snippet), capsys.readouterr().err)
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize(
+    'line', sorted({shlex.join(words) for _, words in STANDING if words[0] == 'dcdrw' and words[1] in ON_TRIALS})
+)
+def test_commands_on_trials_run(line, live_trial, tmp_path, monkeypatch, capsys):
+    for trial in ('first', 'second'):
+        shutil.copytree(live_trial, tmp_path / 'trials' / trial)
+    for bag in ('my_bag', 'killed_bag'):
+        shutil.copytree(live_trial / 'recording', tmp_path / bag)
+    (tmp_path / 'my_rig.yaml').write_text(STIFF)
+    monkeypatch.chdir(tmp_path)
+    words = [path for word in shlex.split(line)[1:] for path in sorted(glob(word)) or [word]]
+    assert main(words) == 0, capsys.readouterr().err
 
 
 def test_commands_within_sentences_exist():
