@@ -14,8 +14,8 @@ from typing import Any
 import aiohttp
 import pytest
 
-PATIENCE = 60.0
-"""Limit of every wait [s]: nodes and browser start slowly on a busy machine."""
+from tests.patience import PATIENCE
+
 NAMES = ('chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable')
 
 

@@ -14,15 +14,14 @@ from dcdrw import entry
 from dcdrw.command_line import _raised_signals
 from dcdrw.console import Interrupted
 from tests import ROOT
+from tests.patience import PATIENCE
 
 pytestmark = pytest.mark.processes
 
-PATIENCE = 60.0
-"""Limit of a wait [s]: for what hangs, not for what is slow."""
 DELAYS = (50, 100, 200, 400, 800)
 """Processor time after which the signal comes [ms]: on a busy machine, too, a process is then equally far."""
 COMMANDS = (
-    'map',
+    'regimes',
     'sweep --out sweep.nc',
     'trial --out trial',
     'live --trial --port 0',

@@ -225,6 +225,7 @@ def test_the_synchronizer_is_enabled_and_stopped_from_the_page_where_that_is_all
     tab.wait("document.getElementById('person').textContent.includes('on the person at most')")
     click(tab, 'enable')
     assert text(tab, 'enable') == 'Really let it push?'
+    bench.wait(lambda: states, 'the state of the synchronizer')
     bench.spin(0.5)
     assert states[-1].data == 'disabled', 'one touch only asks'
     click(tab, 'enable')
@@ -236,7 +237,9 @@ def test_the_synchronizer_is_enabled_and_stopped_from_the_page_where_that_is_all
 
 
 def click(tab: Tab, name: str) -> None:
-    tab.value(f"document.getElementById('{name}').click()")
+    """Press a button, as soon as it can be pressed."""
+    button = f"document.getElementById('{name}')"
+    tab.wait(f'(() => {{ const can = !{button}.disabled; if (can) {button}.click(); return can; }})()')
 
 
 def enter(tab: Tab, name: str, value: float) -> None:

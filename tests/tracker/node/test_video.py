@@ -12,9 +12,9 @@ from dcdrw_msgs_py.frame import Frame
 from dcdrw_msgs_py.opencv import opencv
 from dcdrw_tracker.node.frame_thread import FrameThread, Slot
 from dcdrw_tracker.node.video import CameraDevice, VideoFile, is_device
+from tests.patience import PATIENCE
 
 cv2 = pytest.importorskip('cv2')
-PATIENCE = 60.0
 
 
 def grey(index):
