@@ -39,7 +39,7 @@ from dcdrw_msgs_py.topics import (
     SOURCES_JOINT,
     STEP_DIFFERENCE_JOINT,
 )
-from dcdrw_msgs_py.words import counted
+from dcdrw_msgs_py.words import names_and_positions
 
 SUITE = 'dcdrw'
 """The rig without a namespace, as diagnostics name their hardware; viewers group by it."""
@@ -77,7 +77,7 @@ class Joints:
         count = len(message.name)
         positions, velocities, efforts = message.position, message.velocity, message.effort
         if len(positions) != count:
-            raise ValueError(f'{counted(count, "joint name")} but {counted(len(positions), "position")} given')
+            raise ValueError(names_and_positions(count, len(positions)))
         speeds = velocities if len(velocities) == count else None
         forces = efforts if len(efforts) == count else None
         return [

@@ -15,3 +15,8 @@ def counted(count: object, thing: str) -> str:
 def by_count(count: float, one: str, more: str) -> str:
     """The words that go with so many: `is` or `are`."""
     return one if count == 1 else more
+
+
+def names_and_positions(names: int, positions: int, thing: str = 'joint') -> str:
+    """What is said of a message that names so many things, and gives another number of positions."""
+    return f'{counted(names, f"{thing} name")} but {counted(positions, "position")} given'

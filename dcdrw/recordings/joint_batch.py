@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dcdrw_msgs_py.words import counted
+from dcdrw_msgs_py.words import names_and_positions
 
 
 class JointBatch(NamedTuple):
@@ -94,11 +94,7 @@ class _Layout:
                 else np.full((len(rows), len(self.names)), np.nan)
             )
         positions = self._columns[0][1]
-        error = (
-            ''
-            if positions == len(self.names)
-            else f'{counted(len(self.names), "joint name")} but {counted(positions, "position")} given'
-        )
+        error = '' if positions == len(self.names) else names_and_positions(len(self.names), positions)
         return JointBatch(self.frame, self.names, stamp_ns, columns[0], columns[1], columns[2], error)
 
     def _count(self) -> int:

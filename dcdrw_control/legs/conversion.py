@@ -6,7 +6,7 @@ from typing import Any
 
 from dcdrw_control.legs.mounting import Vector
 from dcdrw_control.legs.samples import LEGS, ContactReading, HipReading, ImuReading, Leg, Reading, WrenchReading
-from dcdrw_msgs_py.words import counted
+from dcdrw_msgs_py.words import names_and_positions
 
 
 def imu_reading(message: Any) -> ImuReading:
@@ -45,7 +45,7 @@ def hip_readings(message: Any, names: Sequence[str]) -> list[tuple[Leg, HipReadi
     """
     given = list(message.name)
     if len(message.position) != len(given):
-        raise ValueError(f'{counted(len(given), "joint name")} but {counted(len(message.position), "position")} given')
+        raise ValueError(names_and_positions(len(given), len(message.position)))
     speeds = message.velocity if len(message.velocity) == len(given) else [math.nan] * len(given)
     hips = [(leg, given.index(name)) for leg, name in zip(LEGS, names, strict=True) if given.count(name) == 1]
     if not hips:

@@ -5,7 +5,7 @@ from typing import Any
 
 from dcdrw_control.reference.order import FRONT_FEET, REAR_FEET
 from dcdrw_control.reference.person import GaitSample
-from dcdrw_msgs_py.words import counted
+from dcdrw_msgs_py.words import names_and_positions
 
 
 def leg_sample(stamp_ns: int, message: Any) -> GaitSample | None:
@@ -16,9 +16,7 @@ def leg_sample(stamp_ns: int, message: Any) -> GaitSample | None:
 
     """
     if len(message.position) != len(message.name):
-        raise ValueError(
-            f'{counted(len(message.name), "leg name")} but {counted(len(message.position), "position")} given'
-        )
+        raise ValueError(names_and_positions(len(message.name), len(message.position), 'leg'))
     phases = {name: angle / math.tau for name, angle in zip(message.name, message.position, strict=True)}
     person, robot = ([phases[foot.leg] for foot in feet if foot.leg in phases] for feet in (FRONT_FEET, REAR_FEET))
     if len(person) < 2:

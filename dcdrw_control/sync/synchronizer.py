@@ -130,7 +130,9 @@ class Synchronizer:
         for i, (turn, wheel) in enumerate(((sample.front, self.params.front), (sample.rear, self.params.rear))):
             before = (last.front, last.rear)[i] if last else turn
             if abs(turn.angle - before.angle) > wheel.alpha:
-                self._struck = [now if j == i or not self._walks else at for j, at in enumerate(self._struck)]
+                if not self._walks:
+                    self._struck = [now, now]
+                self._struck[i] = now
         if self.params.law != 'off':
             self._law.update(sample)
         self._last, self._heard = sample, now

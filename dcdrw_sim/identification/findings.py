@@ -285,6 +285,7 @@ def faults(fit: Fit, index: int) -> list[Fault]:
 def profiles(fit: Fit, told: Callable[[str], None] = unheard) -> list[Profile]:
     """The profile of each parameter: all others, and the starts, sought anew with it held; `told` what is done next."""
     found, best = [], fit.problem.squares(fit.point)
+    curvature: Floats = np.asarray(np.linalg.inv(fit.whole_covariance))
     for index, unknown in enumerate(fit.known.unknowns):
         told(f'how well {unknown.name} is known ({index + 1} of {len(fit.known.unknowns)}) ...')
         at, error = fit.coordinates[index], math.sqrt(fit.covariance[index, index])
@@ -297,7 +298,7 @@ def profiles(fit: Fit, told: Callable[[str], None] = unheard) -> list[Profile]:
                 if value in points or deviance > NORMAL_90**2:
                     break
                 held, more = fit.problem.held(index, value)
-                others = np.delete(_followed(fit, point, index, value), index)
+                others = np.delete(_followed(fit.problem, curvature, point, index, value), index)
                 others = held.solve(others, robust=False, settled=WELL, evaluations=QUICK)
                 deviance = points[value] = held.squares(others) + more - best
                 point = np.insert(others, index, value)
@@ -307,16 +308,15 @@ def profiles(fit: Fit, told: Callable[[str], None] = unheard) -> list[Profile]:
     return found
 
 
-def _followed(fit: Fit, point: Floats, index: int, value: float) -> Floats:
+def _followed(problem: Problem, curvature: Floats, point: Floats, index: int, value: float) -> Floats:
     """Where the best point goes when one unknown is moved, as far as the problem is linear and bounds allow."""
     moved: Floats = point.copy()
     held = np.arange(len(point)) == index
     moved[index] = value
-    curvature = np.linalg.inv(fit.whole_covariance)
     while True:
         off = curvature[np.ix_(~held, held)] @ (moved - point)[held]
         moved[~held] = point[~held] - np.linalg.solve(curvature[np.ix_(~held, ~held)], off)
-        inside = np.clip(moved, fit.problem.low, fit.problem.high)
+        inside = np.clip(moved, problem.low, problem.high)
         beyond = (inside != moved) & ~held
         if not beyond.any():
             return moved
