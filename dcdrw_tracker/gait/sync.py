@@ -2,8 +2,9 @@
 
 Sees only phase samples. In step is what `dcdrw_msgs_py.in_step` says, at every instant: at the samples, and at the
 strikes between them. Noise is dealt with here and nowhere else: the error is smoothed before it is held against the
-band, and once within, it may stray beyond by as much as noise explains, up to `band_hysteresis_percent`. Without noise
-the smoothed error is the error, and the hysteresis is zero.
+band, by no more than noise explains, and once within, it may stray beyond by as much, up to `band_hysteresis_percent`.
+The counts of coarse encoders are noise, too. Without noise the smoothed error is the error, and the hysteresis is zero.
+Noise is what the error does between strikes that no smooth motion does, whatever speeds the source gives.
 """
 
 import math
@@ -26,9 +27,13 @@ SMOOTHING = 0.05
 NOISE_MEMORY = 1.0
 """Time over which the noise of the error is measured [s]."""
 NOISE_SPAN = 3.0
-"""So many times the noise, as root mean square, it may carry the smoothed error beyond the band."""
+"""So many times itself, as root mean square, noise may carry the error from where it is."""
 SURPRISE = 5.0
 """An error further than this from what its past and rate predict is motion, not noise [%]."""
+UNEVEN = 20.0
+"""By how much a third difference is more uneven, in the mean square, than the four values that it is made of."""
+SAME = 0.02
+"""But for this share, a wheel's speeds before and after a strike must tell how far it turned."""
 FASTEST = 100.0
 """A speed beyond this is not a measurement [rad/s]."""
 LONG_WAY = 0.1
@@ -157,6 +162,8 @@ class SyncMonitor:
         self._seen_swing = -math.inf, math.inf
         self._fastest = self._last_fastest = 0.0
         self._noise2 = self._watched = 0.0
+        self._differences = math.nan, math.nan
+        self._resolution = 0.0
         self._synchronized = self._lost = False
         self._losses = self._slips = 0
         self._slipped_at: int | None = None
@@ -220,7 +227,6 @@ class SyncMonitor:
         last = self._last
         if last is None:
             return SyncStatus(restarts=self._restarts, cadence=self._cadence.status())
-        resolution = round(100.0 * last.resolution, 6)
         return SyncStatus(
             stamp_ns=last.stamp_ns,
             phase=0.5 + self._error / 100.0,
@@ -242,8 +248,8 @@ class SyncMonitor:
             losses=self._losses,
             lost=self._lost,
             stalled=self._stalled(last.stamp_ns),
-            resolution_percent=resolution,
-            too_coarse=resolution >= self.params.band_percent,
+            resolution_percent=self._resolution,
+            too_coarse=self._resolution >= self.params.band_percent,
             restarts=self._restarts,
             cadence=self._cadence.status(),
         )
@@ -302,9 +308,10 @@ class SyncMonitor:
     def _take_error(self, last: PhaseSample, phase: PhaseSample, front: int, rear: int, dt: float) -> None:
         """Hold the error against the band: here, and at the strikes on the way."""
         params, strikes = self.params, self._steps + front
+        self._resolution = round(100.0 * phase.resolution, 6)
         edge = params.band_percent
         if self._since <= self._steps:  # a whole step, or more, in the band
-            edge += min(params.band_hysteresis_percent, NOISE_SPAN * math.sqrt(self._noise2))
+            edge += min(params.band_hysteresis_percent, self._stray)
         is_gap = self._cadence.is_gap(dt)
         is_blind = is_gap and dt > SMOOTHING  # for so long that rates foretell nothing
         if is_blind:
@@ -315,6 +322,8 @@ class SyncMonitor:
             foretold = self._smooth + 50.0 * (last.phi.rate + phase.phi.rate) / self._pitch * dt
         before, self._error = self._error, self._percent(phase.phi.angle)
         error = self._error
+        is_smooth = not (front or rear or is_gap) and dt <= SMOOTHING
+        self._take_noise(math.remainder(error - before, 100.0), dt, is_smooth)
         self._take_swing(error)
         speed = abs(phase.phi.rate)
         if speed > self._fastest:
@@ -323,7 +332,7 @@ class SyncMonitor:
             self._take_gap(before, dt, strikes, edge)
         elif front:
             self._was_seen = True
-        self._smooth = smooth = error if is_blind else self._smoothed(foretold, dt, is_gap)
+        self._smooth = smooth = error if is_blind else self._smoothed(foretold, dt)
         self._steps = strikes
         self._since = in_step_from(self._since, strikes, smooth, smooth, edge)
         if self._stalled(phase.stamp_ns):
@@ -347,8 +356,8 @@ class SyncMonitor:
         self, last: PhaseSample, phase: PhaseSample, front: int, rear: int, dt: float, edge: float, is_blind: bool
     ) -> float:
         """Take the error at each forward strike between two samples; returns the error foretold for the later one."""
-        one = _Turning.between(last.front, phase.front, front, dt, self._front_alpha, is_blind)
-        other = _Turning.between(last.rear, phase.rear, rear, dt, self._rear_alpha, is_blind)
+        one = _Turning.between(last.front, phase.front, front, dt, self._front_alpha, is_blind, self._stray)
+        other = _Turning.between(last.rear, phase.rear, rear, dt, self._rear_alpha, is_blind, self._stray)
 
         def error(time: float) -> float:
             return self._smooth + 100.0 * (one.steps(time) - other.steps(time))
@@ -370,15 +379,31 @@ class SyncMonitor:
         if not low <= error <= high:
             self._swing = min(low, error), max(high, error)
 
-    def _smoothed(self, foretold: float, dt: float, is_gap: bool) -> float:
-        """The error that its past and rate foretell, drawn towards the new one; the new one where they disagree."""
+    @property
+    def _stray(self) -> float:
+        """How far noise, or the counts of coarse encoders, may carry the error from where it is [%]."""
+        return max(NOISE_SPAN * math.sqrt(self._noise2), self._resolution)
+
+    def _take_noise(self, moved: float, dt: float, is_smooth: bool) -> None:
+        """Measure noise by the third difference of the error: that of a motion seen evenly without a strike is none."""
+        if not is_smooth:
+            self._differences = math.nan, math.nan
+            return
+        first, second = self._differences
+        bent = moved - first
+        self._differences = moved, bent
+        noise2 = (bent - second) ** 2 / UNEVEN
+        if noise2 <= SURPRISE * SURPRISE:
+            self._watched = min(self._watched + dt, NOISE_MEMORY)
+            self._noise2 += (noise2 - self._noise2) * min(dt / self._watched, 1.0)
+
+    def _smoothed(self, foretold: float, dt: float) -> float:
+        """The error that its past and rate foretell, drawn towards the new one, as far as noise explains."""
         surprise = math.remainder(self._error - foretold, 100.0) if math.isfinite(foretold) else math.inf
         if self._is_held or abs(surprise) > SURPRISE:
             return self._error
-        if not is_gap:  # over which rates foretell less
-            self._watched = min(self._watched + dt, NOISE_MEMORY)
-            self._noise2 += (surprise * surprise - self._noise2) * min(dt / self._watched, 1.0)
-        return math.remainder(foretold + surprise * dt / (dt + SMOOTHING), 100.0)
+        stray, limit = surprise * SMOOTHING / (dt + SMOOTHING), self._stray
+        return math.remainder(self._error - min(max(stray, -limit), limit), 100.0)
 
     def _stalled(self, stamp_ns: int) -> tuple[str, ...]:
         if self._is_held:
@@ -406,12 +431,20 @@ class _Turning(NamedTuple):
     after: float
 
     @classmethod
-    def between(cls, last: Turn, now: Turn, strikes: int, dt: float, alpha: float, is_blind: bool) -> '_Turning':
-        """Turning between two samples, from both and the strikes between them; evenly where speeds tell nothing."""
+    def between(
+        cls, last: Turn, now: Turn, strikes: int, dt: float, alpha: float, is_blind: bool, stray: float
+    ) -> '_Turning':
+        """Turning between two samples, from both and the strikes between them.
+
+        Evenly where speeds tell nothing, or not how far it turned, but for noise that strays so far [%].
+        """
         pitch, rate = 2.0 * alpha, last.rate
+        turned = now.angle - last.angle + pitch * strikes
         if strikes == 1 and not is_blind and 0.0 < rate <= FASTEST and 0.0 <= now.rate <= FASTEST:
-            return cls(pitch, (min((alpha - last.angle) / rate, dt),), rate, now.rate)
-        mean = (now.angle - last.angle + pitch * strikes) / dt
+            struck = min((alpha - last.angle) / rate, dt)
+            if abs(rate * struck + now.rate * (dt - struck) - turned) <= SAME * turned + pitch * stray / 100.0:
+                return cls(pitch, (struck,), rate, now.rate)
+        mean = turned / dt
         times = [(alpha - last.angle + pitch * strike) / mean for strike in range(strikes)] if mean > 0.0 else []
         return cls(pitch, tuple([min(max(time, 0.0), dt) for time in times]), mean, mean)
 

@@ -33,9 +33,9 @@ def later(samples: list[JointSample], seconds: float) -> list[JointSample]:
 
 
 @cache
-def rolled(rate: int) -> list[JointSample]:
-    """The paper's trial, exactly."""
-    rig = SimulatedRig(RigParams(), SimulatorParams(rate=float(rate)))
+def rolled(rate: int, k: float = 5.25, b: float = 100.0) -> list[JointSample]:
+    """A trial, exactly; the paper's by default."""
+    rig = SimulatedRig(RigParams(k=k, b=b), SimulatorParams(rate=float(rate)))
     samples = (rig.read(i / rate, SECOND + i * SECOND // rate) for i in range(26 * rate))
     return [sample for sample in samples if sample]
 
@@ -113,6 +113,32 @@ def test_encoders_too_coarse_for_the_band_are_said_and_finer_ones_change_nothing
     assert ('too coarse for the band' in summary.sentence) == coarse
     assert summary.resolution_percent == pytest.approx(2400.0 / counts if counts <= 4096 else 0.0, abs=1e-3)
     assert coarse or summary.state is PairState.SYNCHRONIZED
+
+
+SPEEDS = {
+    'none': lambda samples, i: (math.nan, math.nan),
+    'those of a moment ago': lambda samples, i: (samples[max(i - 20, 0)].front.rate, samples[max(i - 20, 0)].rear.rate),
+    'all the same': lambda samples, i: (1.0, 1.0),
+    'noisy': lambda samples, i: (
+        samples[i].front.rate + math.sin(1e3 * i * i),
+        samples[i].rear.rate + math.cos(1e3 * i * i),
+    ),
+}
+
+
+@pytest.mark.parametrize(('coupler', 'steps'), [((5.25, 100.0), 38), ((16.0, 10.0), 6), ((41.1, 14.7), None)])
+@pytest.mark.parametrize('rate', [60, 200])
+@pytest.mark.parametrize('speeds', SPEEDS)
+def test_steps_to_synchronization_rest_on_the_rotations_whatever_the_speeds_are(speeds, rate, coupler, steps):
+    """The last one's limit cycle swings by 0.6 % beyond the band: it is never in step."""
+    samples = rolled(rate, *coupler)
+    told = [SPEEDS[speeds](samples, i) for i in range(len(samples))]
+    seen = [
+        sample._replace(front=Turn(sample.front.angle, front), rear=Turn(sample.rear.angle, rear))
+        for sample, (front, rear) in zip(samples, told, strict=True)
+    ]
+    summary = summarize(trial(seen))
+    assert (summary.steps_to_synchronization, summary.losses_of_synchronization) == (steps, 0)
 
 
 def test_what_is_too_coarse_depends_on_the_band():
