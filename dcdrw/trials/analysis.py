@@ -134,7 +134,7 @@ class Analysis(NamedTuple):
     def why_not_run(self) -> str:
         """What was there in the place of a trial; empty where it ran."""
         if self.state is PairState.HELD:
-            return f'the wheels were held for the {self.judged.seconds[-1]:.1f} s that were recorded'
+            return 'the wheels were held all the time'
         if self.state is not PairState.NO_DATA:
             return ''
         if self.unreadable:
@@ -183,6 +183,7 @@ class _Trial:
         self._monitor = SyncMonitor(params.sync)
         self._course = Course(sinks)
         self._moving = False
+        self._is_held = True
         self._received = 0
         self._restarts = self._first_footfall = 0
         self._resumed: Resumption | None = None
@@ -243,12 +244,15 @@ class _Trial:
     def _dated(self, batch: JointBatch) -> JointBatch:
         """The same with the time of recording in place of missing stamps: zero while the wheels turn.
 
-        Stamps that run so much slower than the recording are in other units, milliseconds say: as good as missing.
+        Stamps that then stand still, or run so much slower than the recording, are as good as missing: they are in
+        other units, milliseconds say, or too coarse.
         """
-        if len(batch.log_ns) and np.ptp(batch.log_ns) > SECOND:
-            self._slow_stamps |= 0 < FEWER * int(np.ptp(batch.stamp_ns)) < int(np.ptp(batch.log_ns))
+        if not len(batch.log_ns) or not np.ptp(batch.position, axis=0).any():
+            return batch
+        if np.ptp(batch.log_ns) > SECOND:
+            self._slow_stamps |= FEWER * int(np.ptp(batch.stamp_ns)) < int(np.ptp(batch.log_ns))
         missing = np.full(batch.messages, True) if self._slow_stamps else batch.stamp_ns == 0
-        if np.count_nonzero(missing) < 2 or not len(batch.log_ns) or not np.ptp(batch.position[missing], axis=0).any():
+        if np.count_nonzero(missing) < 2 or not np.ptp(batch.position[missing], axis=0).any():
             return batch
         self._estimator.note_unstamped(int(np.count_nonzero(missing)))
         return batch._replace(stamp_ns=np.where(missing, batch.log_ns, batch.stamp_ns))
@@ -281,6 +285,10 @@ class _Trial:
                 if not self._moving and moves(one):
                     self._let_go(place, len(taken))
                 sync = self._monitor.update(one)
+                if self._is_held:
+                    self._is_held = self._monitor.held
+                    if self._is_held and not moves(one):  # a hand moved them a little, and holds them still
+                        self._moving = False
                 if self._monitor.restarts != self._restarts:
                     self._begin_anew(one, len(taken))
                 self._last = one

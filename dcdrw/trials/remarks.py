@@ -89,10 +89,16 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         yield Remark(f'{counted(estimator.duplicates, "joint state")} came again as {again} once.')
     if estimator.disbelieved > MANY_DISBELIEVED * estimator.accepted:
         yield Remark('The speeds in the joint states do not go with the rotations: those of the rotations are used.')
-    for step in estimator.clock_steps:
+    if estimator.clock_steps:
+        steps = sorted(step.seconds for step in estimator.clock_steps)
+        by = f'by {steps[0]:+.3g} s' + (f' to {steps[-1]:+.3g} s, {counted(len(steps), "time")},' if steps[1:] else '')
         yield Remark(
-            f'The clock of the source was set by {step.seconds:+.3g} s while the wheels rolled on; '
-            'this is undone, and nothing left out.'
+            f'The clock of the source was set {by} while the wheels rolled on; this is undone, and nothing left out.'
+        )
+    if trial.status.strays:
+        yield Remark(
+            f'{counted(trial.status.strays, "sample")} lay apart from both neighbours, and '
+            f'{by_count(trial.status.strays, "is", "are")} passed over.'
         )
     if estimator.rollovers:
         yield Remark(

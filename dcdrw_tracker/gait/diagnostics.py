@@ -66,6 +66,7 @@ def diagnose_sync(status: SyncStatus, age: float, stale_after: float) -> Diagnos
             'initial phase [%]': 100.0 * status.initial_phase,
             CONTRACTION: status.contraction,
             'resolution of the error [%]': status.resolution_percent,
+            'lone wild samples': status.strays,
             'slipped steps': status.slips,
             'times synchronization was lost': status.losses,
             RESTARTS: status.restarts,

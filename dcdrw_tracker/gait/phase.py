@@ -35,7 +35,7 @@ UPHILL_STEPS = 3
 """A wheel that has taken so many more steps uphill than downhill has the wrong sign: rocking takes one."""
 REMEMBERED = 100
 """Restarts and clock steps of which the particulars are kept."""
-LEAST_CLOCK_STEP_NS = 500_000_000
+LEAST_CLOCK_STEP_NS = 200_000_000
 """A jump of the stamps by less is as good as a gap."""
 MANY_SLOW = 5
 """So many strikes, and no other, of wheels that turn slower than any that rolls by itself make the unit doubtful."""
@@ -352,7 +352,8 @@ class PhaseEstimator:
         Where whole turns may not show, the samples must also have arrived without a pause.
         """
         period_ns = self._cadence.period_ns
-        if not period_ns or elapsed_ns <= 10 * period_ns:
+        slowest = min(abs(self._front.pace), abs(self._rear.pace))
+        if not period_ns or elapsed_ns <= 10 * period_ns or slowest * elapsed_ns < 4e9 * self._tolerance.hysteresis:
             return False
         paused_ns = arrival_ns - self._arrived_ns if self._arrived_ns and arrival_ns else elapsed_ns
         if (self._front.may_wrap or self._rear.may_wrap) and paused_ns > elapsed_ns // 2:

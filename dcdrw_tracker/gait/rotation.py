@@ -225,7 +225,8 @@ class Rotation:
             agrees = abs(self._told - self.pace) <= 0.5 * max(abs(self.pace), LEAST_PACE)
             # A wheel that is let go within a gap has not turned as far as its speed tells: that passes within a second.
             self._doubted = 0.0 if agrees else self._doubted + min(dt, 0.1 * PACE_MEMORY)
-            if self._doubted > PACE_MEMORY:  # zero, say, or in other units
+            is_empty = rate == 0.0 and abs(slope) > LEAST_PACE
+            if is_empty or self._doubted > PACE_MEMORY:  # in other units, say
                 self.disbelieved += 1
                 rate = slope
         self.rate = rate

@@ -105,6 +105,8 @@ class SyncStatus(NamedTuple):
     """Ratio by which a step shrinks the distance to the fixed point: the last that could be told, or NaN."""
     history: tuple[float, ...] = ()
     """Error at each strike of the front wheel [%]."""
+    strays: int = 0
+    """Lone wild samples, which are passed over."""
     slips: int = 0
     """Times that a wheel struck twice in a row."""
     slipped: bool = False
@@ -163,9 +165,10 @@ class SyncMonitor:
         self._fastest = self._last_fastest = 0.0
         self._noise2 = self._watched = 0.0
         self._differences = math.nan, math.nan
+        self._wild: float | None = None
         self._resolution = 0.0
         self._synchronized = self._lost = False
-        self._losses = self._slips = 0
+        self._losses = self._slips = self._strays = 0
         self._slipped_at: int | None = None
         self._usual = 0, 0
         self._swing = self._last_swing = math.nan, math.nan
@@ -218,6 +221,11 @@ class SyncMonitor:
         return even if abs(speed * even - turned) < abs(speed * dt - turned) else dt
 
     @property
+    def held(self) -> bool:
+        """Whether the wheels are held."""
+        return self._is_held
+
+    @property
     def restarts(self) -> int:
         """How often the source has started anew."""
         return self._restarts
@@ -243,6 +251,7 @@ class SyncMonitor:
             final_band_percent=self._final_band(),
             contraction=self._contraction,
             history=tuple(self._history),
+            strays=self._strays,
             slips=self._slips,
             slipped=self._slipped_at is not None and self._steps - self._slipped_at < self.params.hold_steps,
             losses=self._losses,
@@ -324,7 +333,6 @@ class SyncMonitor:
         error = self._error
         is_smooth = not (front or rear or is_gap) and dt <= SMOOTHING
         self._take_noise(math.remainder(error - before, 100.0), dt, is_smooth)
-        self._take_swing(error)
         speed = abs(phase.phi.rate)
         if speed > self._fastest:
             self._fastest = speed
@@ -332,9 +340,8 @@ class SyncMonitor:
             self._take_gap(before, dt, strikes, edge)
         elif front:
             self._was_seen = True
-        self._smooth = smooth = error if is_blind else self._smoothed(foretold, dt)
         self._steps = strikes
-        self._since = in_step_from(self._since, strikes, smooth, smooth, edge)
+        self._judge(error if is_blind else foretold, dt, edge)
         if self._stalled(phase.stamp_ns):
             self._since = strikes + 1
         if strikes_in_step(self._since, strikes) >= params.hold_steps:
@@ -397,13 +404,28 @@ class SyncMonitor:
             self._watched = min(self._watched + dt, NOISE_MEMORY)
             self._noise2 += (noise2 - self._noise2) * min(dt / self._watched, 1.0)
 
-    def _smoothed(self, foretold: float, dt: float) -> float:
-        """The error that its past and rate foretell, drawn towards the new one, as far as noise explains."""
+    def _judge(self, foretold: float, dt: float, edge: float) -> None:
+        """Hold the error against the band: that which its past and rate foretell, drawn as far as noise explains.
+
+        One that is elsewhere waits for the next: where that goes on from what was foretold, it was a lone wild sample.
+        """
         surprise = math.remainder(self._error - foretold, 100.0) if math.isfinite(foretold) else math.inf
+        wild, self._wild = self._wild, None
         if self._is_held or abs(surprise) > SURPRISE:
-            return self._error
-        stray, limit = surprise * SMOOTHING / (dt + SMOOTHING), self._stray
-        return math.remainder(self._error - min(max(stray, -limit), limit), 100.0)
+            if wild is None and not self._is_held and math.isfinite(surprise):
+                self._wild, self._smooth = self._error, math.remainder(foretold, 100.0)
+                return
+            stray = 0.0
+        else:
+            self._strays += wild is not None
+            limit, wild = self._stray, None
+            stray = min(max(surprise * SMOOTHING / (dt + SMOOTHING), -limit), limit)
+        self._smooth = smooth = math.remainder(self._error - stray, 100.0)
+        self._take_swing(self._error)
+        self._since = in_step_from(self._since, self._steps, smooth, smooth, edge)
+        if wild is not None:
+            self._take_swing(wild)
+            self._since = in_step_from(self._since, self._steps, wild, wild, edge)
 
     def _stalled(self, stamp_ns: int) -> tuple[str, ...]:
         if self._is_held:
@@ -415,7 +437,8 @@ class SyncMonitor:
         return wrapped_percent(phi / self._pitch)
 
     def _sample(self, phase: PhaseSample) -> SyncSample:
-        synchronized = self._synchronized and not self._is_held  # wheels that are held do not walk
+        # Wheels that are held do not walk; whether a wild sample is alone is not known yet.
+        synchronized = self._synchronized and not self._is_held and self._wild is None
         return SyncSample(phase.stamp_ns, self._error / 100.0 * self._pitch, self._error, synchronized)
 
 

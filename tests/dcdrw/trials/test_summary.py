@@ -374,3 +374,72 @@ def test_every_count_is_json(tmp_path):
     assert told['samples']['restarts'][0]['cause'] == 'rotation'
     assert [remark['rests_on_less'] for remark in told['remarks'][:2]] == [True, True]
     assert np.isfinite(told['duration_s'])
+
+
+@pytest.mark.parametrize('seconds', [-0.3, 0.2, 0.3, 0.45])
+def test_a_clock_that_is_set_a_little_costs_no_step(seconds):
+    samples = rolled(RATE)
+    half = len(samples) // 3
+    summary = summarize(trial(samples[:half] + later(samples[half:], seconds)))
+    assert (summary.steps_to_synchronization, summary.complete) == (38, True)
+    assert [step.seconds for step in summary.samples.clock_steps] == pytest.approx([seconds])
+
+
+def test_a_clock_that_is_set_again_and_again_is_told_once():
+    samples = [sample for i in range(5) for sample in later(rolled(RATE)[i * 1000 : i * 1000 + 1000], -0.9 * i)]
+    summary = summarize(trial(samples))
+    assert len(summary.samples.clock_steps) == 4
+    assert summary.sentence.count('The clock of the source was set') == 1
+    assert 'by -0.9 s to -0.9 s, 4 times, while' in summary.sentence
+
+
+@pytest.mark.parametrize('stamp_ns', [0, SECOND, 1_700_000_000 * SECOND])
+def test_stamps_that_stand_still_while_the_wheels_turn_are_none(stamp_ns):
+    samples = rolled(RATE)
+    recorded = batch(samples)
+    still = recorded._replace(stamp_ns=np.full_like(recorded.stamp_ns, stamp_ns))
+    summary = summarize(analyze([still], TrialParams()))
+    assert (summary.steps_to_synchronization, summary.samples.unstamped) == (38, len(samples))
+
+
+@pytest.mark.parametrize('rates', [True, False])
+@pytest.mark.parametrize('glitch', [-0.1, -0.06, 0.05, 0.1])
+def test_a_lone_wild_sample_is_passed_over_and_told(glitch, rates):
+    samples = rolled(RATE)
+    if not rates:
+        samples = [sample._replace(front=Turn(sample.front.angle), rear=Turn(sample.rear.angle)) for sample in samples]
+    wild = samples[-300]
+    samples = [
+        *samples[:-300],
+        wild._replace(front=wild.front._replace(angle=wild.front.angle + glitch)),
+        *samples[-299:],
+    ]
+    summary = summarize(trial(samples))
+    assert summary.steps_to_synchronization == 38
+    assert '1 sample lay apart from both neighbours, and is passed over.' in summary.sentence
+
+
+def test_speeds_that_are_always_zero_hide_no_beginning():
+    samples = rolled(RATE)
+    still = [
+        sample._replace(front=Turn(sample.front.angle, 0.0), rear=Turn(sample.rear.angle, 0.0)) for sample in samples
+    ]
+    summary = summarize(trial(still))
+    assert summary.steps_to_synchronization == 38
+    assert summary.initial_phase_percent == pytest.approx(21.6, abs=0.5)
+
+
+@pytest.mark.parametrize('at', [0.0, 2.0, 3.6])
+def test_wheels_that_a_hand_moves_by_less_than_a_degree_are_held(at):
+    """Until they are let go: from then on it is the trial that it would have been."""
+    moved = [
+        sample._replace(
+            front=Turn(sample.front.angle + 0.015 * math.sin(10 * t) ** 2, 0.15 * math.sin(20 * t)),
+        )
+        if 0.0 < (t := i / RATE - at) < 0.3
+        else sample
+        for i, sample in enumerate(held(4.0))
+    ]
+    summary = summarize(trial(moved))
+    assert (summary.state, summary.reason) == (PairState.HELD, 'the wheels were held all the time')
+    assert summarize(trial(moved + later(WALK, 4.0))).sentence == summarize(trial(WALK)).sentence

@@ -80,6 +80,7 @@ def test_the_keys_of_the_contract_are_there_with_bare_numbers_and_the_unit_in_th
         'initial phase [%]': '21.6',
         'per-step convergence ratio': '0.9',
         'resolution of the error [%]': '0',
+        'lone wild samples': '0',
         'slipped steps': '0',
         'times synchronization was lost': '0',
         'restarts of the source': '0',
