@@ -7,9 +7,9 @@ from typing import Any
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import PointStamped
+from geometry_msgs.msg import PointStamped, WrenchStamped
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Header
+from std_msgs.msg import Float64, Header, Int32
 
 from dcdrw_msgs_py.diagnosis import Diagnosis, Level, value_text
 from dcdrw_msgs_py.rig import FRONT, REAR
@@ -119,14 +119,9 @@ class JointSampleReader:
             ValueError: as `Joints.read`.
 
         """
-        front, rear, coupler = self._joints.read(message)
-        return JointSample(
-            stamp_ns(message.header.stamp),
-            Turn(*front[:2]),
-            Turn(*rear[:2]),
-            CouplerSample(*coupler),
-            self.runs.of(stamp_ns(message.header.stamp)),
-        )
+        (psi1, rate1, _), (psi2, rate2, _), coupler = self._joints.read(message)
+        stamp = stamp_ns(message.header.stamp)
+        return JointSample(stamp, Turn(psi1, rate1), Turn(psi2, rate2), CouplerSample(*coupler), self.runs.of(stamp))
 
     def read_any(self, message: Any) -> JointSample | LoneWheel:
         """The sample in a message, or the one wheel that it has.
@@ -135,14 +130,15 @@ class JointSampleReader:
             ValueError: as `Joints.read`; neither wheel is there.
 
         """
-        present = [wheel for wheel, name in self._wheels.items() if name in message.name]
-        if len(present) != 1:
+        names = message.name
+        has_front = self._wheels[FRONT] in names
+        if has_front == (self._wheels[REAR] in names):
             return self.read(message)
         front, rear, coupler = self._any.read(message)
         return LoneWheel(
             stamp_ns(message.header.stamp),
-            present[0],
-            Turn(*(front if present[0] == FRONT else rear)[:2]),
+            FRONT if has_front else REAR,
+            Turn(*(front if has_front else rear)[:2]),
             CouplerSample(*coupler),
             self.runs.of(stamp_ns(message.header.stamp)),
         )
@@ -228,6 +224,30 @@ class PhaseSampleWriter:
         longer.position = message.position + array('d', (sources, resolution))
         longer.velocity = message.velocity + array('d', (0.0, 0.0))
         return longer
+
+
+class WrenchWriter:
+    """Writes a force and a torque into one message, which is used again and again."""
+
+    def __init__(self) -> None:
+        self._message = WrenchStamped()
+
+    def write(self, stamp: int, force: float, torque: float = 0.0) -> Any:
+        """The message of a force along x [N] and a torque about y [N·m] at a time [ns]; valid until the next call."""
+        message = self._message
+        message.header.stamp = to_stamp(stamp)
+        message.wrench.force.x, message.wrench.torque.y = force, torque
+        return message
+
+
+def float_message(value: float) -> Any:
+    """A number without a stamp."""
+    return Float64(data=value)
+
+
+def integer_message(value: int) -> Any:
+    """A whole number without a stamp."""
+    return Int32(data=value)
 
 
 def run_message(stamp: int, number: int) -> Any:

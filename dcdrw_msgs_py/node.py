@@ -45,6 +45,8 @@ LEASE_SECONDS = 1.0
 """The liveliness that a latched topic offers: who asks for as much is told when its publisher is gone [s]."""
 TWIN_SECONDS = 0.2
 """A terminal and `ros2 launch` both pass on one Ctrl-C: a second signal this soon is the same one [s]."""
+LOOK_SECONDS = 0.02
+"""So seldom a publisher looks whether anybody listens: to look costs as much as to publish to nobody [s]."""
 BURST_SECONDS = 4.0
 """Who has to miss nothing falls behind for so long in a burst, of a source that catches up, before it drops any [s]."""
 BURST_DEPTH = 4 * SAMPLE_DEPTH
@@ -165,6 +167,7 @@ class Outlet:
 
     def __init__(self, publisher: Any, latched: bool) -> None:
         self._publisher, self._latched = publisher, latched
+        self._listeners, self._look_at = 0, 0.0
         self._by_message: list[Callable[[Any], None]] = []
         self._by_sample: list[Callable[[Any], None]] = []
         self._last: Any = None
@@ -172,7 +175,7 @@ class Outlet:
     @property
     def is_heard(self) -> bool:
         """Whether anybody listens, or will hear it later, so that a message is worth being made."""
-        return bool(self._latched or self._by_message or self._publisher.get_subscription_count())
+        return bool(self._by_message or self._is_heard_outside())
 
     def hand_to(self, callback: Callable[[Any], None], take_sample: Callable[[Any], None] | None) -> None:
         """Hand over from now on, of a latched topic the last message at once; arguments as of `listen`."""
@@ -187,7 +190,7 @@ class Outlet:
         """Publish a message to all who listen now; a listener of this process must not keep it."""
         if self._latched:
             self._last = message
-        if self._latched or self._publisher.get_subscription_count():
+        if self._is_heard_outside():
             self._publisher.publish(message)
         for callback in self._by_message:
             callback(message)
@@ -198,6 +201,12 @@ class Outlet:
             self.publish(write(sample))
         for take_sample in self._by_sample:
             take_sample(sample)
+
+    def _is_heard_outside(self) -> bool:
+        now = time.monotonic()
+        if now >= self._look_at:
+            self._listeners, self._look_at = self._publisher.get_subscription_count(), now + LOOK_SECONDS
+        return bool(self._latched or self._listeners)
 
     def __getattr__(self, name: str) -> Any:
         """All else is the publisher's."""

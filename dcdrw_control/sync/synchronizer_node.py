@@ -5,16 +5,15 @@ import sys
 import time
 from typing import Any
 
-from geometry_msgs.msg import WrenchStamped
 from rclpy.node import Node
-from std_msgs.msg import Float64, String
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from dcdrw_control.sync.diagnosis import diagnose_synchronizer
 from dcdrw_control.sync.safety import State
 from dcdrw_control.sync.synchronizer import Command, Synchronizer, SynchronizerParams
 from dcdrw_msgs_py.diagnosis import Diagnosis
-from dcdrw_msgs_py.messages import PhaseSampleReader, to_stamp
+from dcdrw_msgs_py.messages import PhaseSampleReader, WrenchWriter, float_message
 from dcdrw_msgs_py.node import Parameters, advertise, listen_aged, publish_diagnosis, run, steady_clock
 from dcdrw_msgs_py.samples import PhaseSample
 from dcdrw_msgs_py.topics import (
@@ -42,7 +41,7 @@ class SynchronizerNode(Node):
         super().__init__('synchronizer', **kwargs)
         settings = Parameters(self, SynchronizerParams, self._configure, SynchronizerParams.check_law)
         self._core = Synchronizer(settings.value)
-        self._reader = PhaseSampleReader()
+        self._reader, self._writer = PhaseSampleReader(), WrenchWriter()
         self._told: State | None = None
         self._command = Command(0.0, 0.0, State.DISABLED, 0)
         self._last_clock = 0
@@ -95,12 +94,9 @@ class SynchronizerNode(Node):
 
     def _publish(self, command: Command) -> None:
         self._command = command
-        self._effort.publish(Float64(data=command.torque if self._core.drives_hub else command.force))
+        self._effort.publish_sample(command.torque if self._core.drives_hub else command.force, float_message)
         if self._wrench.is_heard:
-            wrench = WrenchStamped()
-            wrench.header.stamp = to_stamp(command.stamp_ns)
-            wrench.wrench.force.x, wrench.wrench.torque.y = command.force, command.torque
-            self._wrench.publish(wrench)
+            self._wrench.publish(self._writer.write(command.stamp_ns, command.force, command.torque))
         if command.state is not self._told:
             self._told = command.state
             self._state.publish(String(data=command.state.value))

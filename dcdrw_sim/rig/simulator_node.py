@@ -7,13 +7,12 @@ from contextlib import suppress
 from functools import partial
 from typing import Any
 
-from geometry_msgs.msg import WrenchStamped
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock as ClockMessage
 from std_srvs.srv import SetBool, Trigger
 
 from dcdrw_msgs_py.diagnosis import STATE, STEP_DIFFERENCE, Diagnosis, Level, SourceState
-from dcdrw_msgs_py.messages import JointSampleWriter, run_message, to_stamp
+from dcdrw_msgs_py.messages import JointSampleWriter, WrenchWriter, run_message, to_stamp
 from dcdrw_msgs_py.node import Age, Parameters, advertise, listen_aged, publish_diagnosis, run, steady_clock
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
 from dcdrw_msgs_py.samples import SECOND
@@ -64,7 +63,7 @@ class SimulatorNode(Node):
         self._failure = ''
         self._refused_commands = 0
         self._commands = {COUPLER_FORCE_COMMAND: Age(), REAR_TORQUE_COMMAND: Age()}
-        self._writer = JointSampleWriter()
+        self._writer, self._person_writer = JointSampleWriter(), WrenchWriter()
         self._runs = advertise(self, RUNS)
         # Not 1: a simulator that was started anew must not seem to go on with the run of the one before.
         self._run = time.time_ns() // SECOND
@@ -153,10 +152,7 @@ class SimulatorNode(Node):
         if sample:
             self._joint_states.publish(self._writer.write(sample))
             if self._person_force:
-                wrench = WrenchStamped()
-                wrench.header.stamp = to_stamp(stamp_ns)
-                wrench.wrench.force.x = -sample.coupler.force
-                self._person_force.publish(wrench)
+                self._person_force.publish(self._person_writer.write(stamp_ns, -sample.coupler.force))
         timeline.step(self._paused)
 
     def _configure(self, params: SimulatorParams) -> None:

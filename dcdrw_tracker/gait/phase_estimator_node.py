@@ -4,10 +4,15 @@ import sys
 from typing import Any
 
 from rclpy.node import Node
-from std_msgs.msg import Float64, Int32
 
 from dcdrw_msgs_py.diagnosis import Diagnosis, contested
-from dcdrw_msgs_py.messages import JointSampleReader, PhaseSampleWriter, footfall_message
+from dcdrw_msgs_py.messages import (
+    JointSampleReader,
+    PhaseSampleWriter,
+    float_message,
+    footfall_message,
+    integer_message,
+)
 from dcdrw_msgs_py.node import Age, Parameters, advertise, follow_runs, listen, publish_diagnosis, publishers, run
 from dcdrw_msgs_py.rig import FRONT
 from dcdrw_msgs_py.samples import LoneWheel
@@ -75,8 +80,8 @@ class PhaseEstimatorNode(Node):
             if self._sources > 1:
                 phase = phase._replace(sources=self._sources)
             self._phase.publish_sample(phase, self._writer.write)
-        self._phi.publish(Float64(data=update.phase.phi.angle))
-        self._step_difference.publish(Int32(data=update.phase.step_difference))
+        self._phi.publish_sample(update.phase.phi.angle, float_message)
+        self._step_difference.publish_sample(update.phase.step_difference, integer_message)
         for footfall in update.footfalls:
             self._footfalls[footfall.wheel].publish(footfall_message(footfall))
 
