@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+Mask = NDArray[np.bool_]
 
 Real = float | Floats
 """A number, or an array of them side by side."""

@@ -201,11 +201,14 @@ def report(recordings: Sequence[Path], outcome: Outcome) -> Iterator[str]:
 def _explanation(left: Misfit | None) -> str:
     if left is None:
         return 'The model explains the trial.'
-    return (
-        f'NO parameters of the model explain this trial: the {(FRONT, REAR)[left.wheel]} wheel is off by '
+    where = (
+        f'{100.0 * left.outliers:.0f} % of its samples are outliers: find where they come from'
+        if left.is_outliers
+        else f'the {(FRONT, REAR)[left.wheel]} wheel is off by '
         f'{math.degrees(left.worst):.2f}° from {left.begins:.1f} to {left.ends:.1f} s, '
-        f'most at stance angles about {math.degrees(left.theta):.0f}°; the errors below mean nothing'
+        f'most at stance angles about {math.degrees(left.theta):.0f}°'
     )
+    return f'NO parameters of the model explain this trial: {where}; the errors below mean nothing'
 
 
 def _warning(fault: Fault) -> str:

@@ -6,6 +6,7 @@ from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import binary_opening
 
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.rolling import default_rest_length
@@ -25,8 +26,12 @@ BEYOND_NOISE = 1.5
 """Residuals of more than so many times the noise are not explained ..."""
 TOLERATED = 0.01
 """... unless they are below this part of α: spokes are no straighter."""
-MOST_OUTLIERS = 0.1
-"""A trial of more outliers is not explained."""
+SCATTERED = 0.5
+"""Residuals above this part of α explain nothing, whatever the noise: they no longer tell one spoke from the next."""
+IN_A_ROW, MOST_IN_ROWS = 5, 0.1
+"""So many outliers in a row are a motion of their own: more than this part of the samples is not explained ..."""
+MOST_OUTLIERS = 0.4
+"""... nor is a trial of which more than this part are outliers, in a row or not."""
 WELL = 1e-5
 """Part of the squares by which a profile's last step changes them: by little beside 1."""
 PROFILE, QUICK = (0.9, 1.8, 2.7, 4.0, 6.0), 10
@@ -101,6 +106,13 @@ class Misfit(NamedTuple):
     """Stance angle about which the mean residual is greatest [rad]."""
     worst: float
     """Mean residual of that time [rad]."""
+    outliers: float
+    """Part of the trial's samples that are outliers."""
+
+    @property
+    def is_outliers(self) -> bool:
+        """Whether it is the outliers for which the trial is not explained."""
+        return self.outliers > MOST_OUTLIERS
 
 
 class Fault(NamedTuple):
@@ -249,8 +261,10 @@ def _gain(fit: Fit, what: str, covariance: Floats) -> Gain:
 def misfit(fit: Fit, trial: Explained) -> Misfit | None:
     """Where a trial departs from what any parameters explain; None where it does not."""
     rig, noise = fit.known.rig, max(trial.samples.noise(), 1e-9)
-    tolerated = max(BEYOND_NOISE * noise, TOLERATED * rig.front.alpha)
-    if trial.noise <= tolerated and trial.outliers.mean() <= MOST_OUTLIERS:
+    tolerated = min(max(BEYOND_NOISE * noise, TOLERATED * rig.front.alpha), SCATTERED * rig.front.alpha)
+    outliers = float(trial.outliers.mean())
+    in_rows = binary_opening(trial.outliers, np.ones((IN_A_ROW, 1))).mean()
+    if trial.noise <= tolerated and in_rows <= MOST_IN_ROWS and outliers <= MOST_OUTLIERS:
         return None
     pieces = np.array_split(np.arange(len(trial.residuals)), PIECES)
     means = np.array([np.median(trial.residuals[piece], axis=0) for piece in pieces])
@@ -270,6 +284,7 @@ def misfit(fit: Fit, trial: Explained) -> Misfit | None:
         float(seconds[-1]),
         float(0.5 * (edges[at] + edges[at + 1])),
         float(means[piece, wheel]),
+        outliers,
     )
 
 

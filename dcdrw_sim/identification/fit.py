@@ -10,12 +10,11 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 
 from dcdrw_msgs_py.rolling import stance_distance
-from dcdrw_msgs_py.values import Floats
+from dcdrw_msgs_py.values import Floats, Mask
 from dcdrw_sim.identification.samples import Samples
 from dcdrw_sim.identification.unknowns import Knowledge
 from dcdrw_sim.motion.ensemble import sample_pairs, spread
@@ -56,7 +55,6 @@ WRONG_ZERO, WRONG_STAMPS = math.radians(2.0), 0.1
 EVIDENT = 8.0
 """Zeros or stamps are taken for wrong where that explains so much more [of squares in standard deviations]: by chance
 that is so in one of twenty trials, whose errors are but greater then."""
-Mask = NDArray[np.bool_]
 
 
 class Explained(NamedTuple):
@@ -91,7 +89,7 @@ class Problem:
         known: of the rig.
         trials: to be explained.
         deviations: standard deviation of each trial's samples [rad].
-        used: samples of each trial that count, shape (T, 2); None: all.
+        used: samples of each trial that count, shape (T, 2); None: all that are plausible.
         zero: to what the wheels' zeros are known [rad].
         late: to what it is known that both wheels' samples are of one time [s]; 0: they are.
 
@@ -108,7 +106,7 @@ class Problem:
     ) -> None:
         self.known, self.trials, self._deviations = known, trials, deviations
         self._zero, self._late = zero, late
-        self._used = used or [np.ones(trial.rotations.shape, bool) for trial in trials]
+        self._used = used or [trial.plausible for trial in trials]
         self._size = len(known.unknowns)
         self._steps = STEP * np.sqrt(np.diag(known.covariance))
         self._root = np.linalg.cholesky(known.covariance)
@@ -397,8 +395,8 @@ def _explained(problem: Problem, x: Floats) -> list[Explained]:
         start, systematic, late = problem.own(index, x)
         rotations = problem.rotations(index, np.concatenate([x[:size], start, systematic.ravel(), [late]])[None])[0]
         residuals = samples.rotations - rotations
-        spread_of = max(float(np.median(np.abs(residuals))) / 0.6745, 1e-9)
-        outliers = np.abs(residuals) > OUTLYING * spread_of
+        spread_of = max(float(np.median(np.abs(residuals[samples.plausible]))) / 0.6745, 1e-9)
+        outliers = ~samples.plausible | (np.abs(residuals) > OUTLYING * spread_of)
         noise = float(np.sqrt(np.mean(residuals[~outliers] ** 2)))
         memory = _memory(residuals, outliers)
         found.append(Explained(samples, start, systematic, late, residuals, outliers, max(noise, 1e-9), memory))

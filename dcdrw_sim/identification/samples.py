@@ -4,10 +4,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d
 
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.rolling import stance
-from dcdrw_msgs_py.values import Floats
+from dcdrw_msgs_py.values import Floats, Mask
 from dcdrw_msgs_py.words import counted
 
 AT_REST = 1.0
@@ -22,6 +23,8 @@ RATE_ENOUGH = 100.0
 with the number of samples."""
 NEAR = 0.15
 """The speed at the start is first taken from samples within this [s]."""
+NEIGHBOURS, BY_NOISE = 7, 6.0
+"""A sample further from the median of so many than a wheel turns meanwhile, and so many times the noise, is wild."""
 
 
 class Samples(NamedTuple):
@@ -31,6 +34,8 @@ class Samples(NamedTuple):
     """Since the first, shape (T,)."""
     rotations: Floats
     """ψ1 and ψ2 [rad], shape (T, 2); each from zero at the stance spoke of the first sample."""
+    plausible: Mask
+    """Which of them are not wild, whatever the rig: the others tell nothing. Shape (T, 2)."""
     steps: int
     """n at the first sample."""
     begins: float
@@ -39,19 +44,25 @@ class Samples(NamedTuple):
     def until(self, seconds: float) -> 'Samples':
         """The part that comes first."""
         count = max(int(np.searchsorted(self.seconds, seconds, side='right')), FEWEST)
-        return self._replace(seconds=self.seconds[:count], rotations=self.rotations[:count])
+        return self._replace(
+            seconds=self.seconds[:count], rotations=self.rotations[:count], plausible=self.plausible[:count]
+        )
 
     def first_state(self) -> Floats:
         """[θ1, ω1, θ2, ω2] about as they are at the first sample."""
-        near = slice(0, max(int(np.searchsorted(self.seconds, NEAR)), 6))
-        return np.ravel([np.polyfit(self.seconds[near], self.rotations[near, i], 1)[::-1] for i in range(2)])
+        count, found = max(int(np.searchsorted(self.seconds, NEAR)), 6), []
+        for plausible, psi in zip(self.plausible.T, self.rotations.T, strict=True):
+            near = np.flatnonzero(plausible)[:count]
+            found.append(np.polyfit(self.seconds[near], psi[near], 1)[::-1])
+        return np.ravel(found)
 
     def noise(self) -> float:
         """Standard deviation of what differs from sample to sample, of one angle [rad].
 
         From third differences, which know nothing of a smooth motion; the median leaves out strikes and outliers.
         """
-        differences = np.diff(self.rotations, n=3, axis=0)
+        differences = np.diff(np.where(self.plausible, self.rotations, np.nan), n=3, axis=0)
+        differences = differences[np.isfinite(differences)]
         return float(np.median(np.abs(differences))) / (0.6745 * math.sqrt(20.0))
 
 
@@ -69,11 +80,14 @@ def free_rolling(rig: RigParams, seconds: Floats, rotations: Floats) -> Samples:
     """
     seen = np.isfinite(rotations).all(axis=1)
     seconds, rotations = _together(seconds[seen], rotations[seen])
-    end = _first_rest(seconds, rotations)
+    level = median_filter(rotations, (NEIGHBOURS, 1), mode='reflect')
+    plausible = _plausible(rotations, level)
+    likely = np.where(plausible, rotations, level)
+    end = _first_rest(seconds, likely)
     alphas = np.array([rig.front.alpha, rig.rear.alpha])
-    of_wheels = [stance(alpha, psi) for alpha, psi in zip(alphas, rotations.T, strict=True)]
+    of_wheels = [stance(alpha, psi) for alpha, psi in zip(alphas, likely.T, strict=True)]
     spokes, thetas = (np.stack(columns, axis=1) for columns in zip(*of_wheels, strict=True))
-    calm = np.flatnonzero((np.abs(thetas[:end]) < alphas - AWAY).all(axis=1))
+    calm = np.flatnonzero((plausible[:end] & (np.abs(thetas[:end]) < alphas - AWAY)).all(axis=1))
     if not calm.size or end - calm[0] < FEWEST:
         raise ValueError(f'both wheels roll in {counted(max(end, 0), "sample")} only: nothing can be told of them')
     first = int(calm[0])
@@ -82,9 +96,17 @@ def free_rolling(rig: RigParams, seconds: Floats, rotations: Floats) -> Samples:
     return Samples(
         seconds[first:end] - seconds[first],
         rotations[first:end] - 2.0 * alphas * spokes[first],
+        plausible[first:end],
         int(ahead[first]) + int(behind),
         float(seconds[first]),
     )
+
+
+def _plausible(rotations: Floats, level: Floats) -> Mask:
+    """Which rotations lie where their neighbours do, whose median is the level; shapes (N, 2)."""
+    away = np.abs(rotations - level)
+    turned = maximum_filter1d(level, NEIGHBOURS, axis=0) - minimum_filter1d(level, NEIGHBOURS, axis=0)
+    return np.asarray(away <= turned + BY_NOISE * np.median(away, axis=0) / 0.6745)
 
 
 def _together(seconds: Floats, rotations: Floats) -> tuple[Floats, Floats]:

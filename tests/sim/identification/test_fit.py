@@ -45,6 +45,14 @@ def fit():
     return identify(knowledge(SAID, FIXED), [free_rolling(SAID, *trial())])
 
 
+def spoiled(part, seed=2):
+    """A trial of which a part of the samples of each wheel is off by up to 1 rad."""
+    times, psi = trial()
+    rng = np.random.default_rng(seed)
+    wild = rng.random(psi.shape) < part
+    return times, psi + np.where(wild, rng.uniform(-1.0, 1.0, psi.shape), 0.0)
+
+
 def deviations(fit, rig=TRUE):
     """How far each unknown is from the truth, in its standard errors."""
     truth = np.array([unknown.coordinate(rig.resolved()) for unknown in fit.known.unknowns])
@@ -118,6 +126,22 @@ def test_no_parameter_explains_a_wheel_that_was_pushed():
     left = misfit(found, found.trials[0])
     assert left is not None
     assert abs(left.worst) > NOISE
+    assert not left.is_outliers
+
+
+@pytest.mark.parametrize('wild', [0.1, 0.3])
+def test_wild_samples_spoil_nothing(fit, wild):
+    """Nor do they make the noise, or the errors, seem greater than they are."""
+    found = identify(knowledge(SAID, FIXED), [free_rolling(SAID, *spoiled(wild))])
+    assert misfit(found, found.trials[0]) is None
+    assert found.trials[0].outliers.mean() == pytest.approx(wild, abs=0.05)
+    assert found.trials[0].noise == pytest.approx(fit.trials[0].noise, rel=0.2)
+    assert np.abs(deviations(found)).max() < 3.0
+
+
+def test_a_trial_of_which_half_the_samples_are_wild_is_told_so():
+    found = identify(knowledge(SAID, FIXED), [free_rolling(SAID, *spoiled(0.6))])
+    assert misfit(found, found.trials[0]) is not None
 
 
 def test_exact_degeneracies_are_named():
