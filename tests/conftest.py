@@ -10,7 +10,7 @@ from hypothesis import settings
 
 from tests import ROOT
 from tests.patience import PATIENCE
-from tests.trials import STIFF
+from tests.trials import FIRST, STIFF
 
 if TYPE_CHECKING:
     from tests.bench import Bench
@@ -40,15 +40,13 @@ def bench(tmp_path: Path) -> Iterator['Bench']:
 def live_trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a trial that was run live: 200 Hz, in step within its 5 s."""
     folder = tmp_path_factory.mktemp('trial')
-    (folder / 'rig.yaml').write_text(STIFF)
+    (folder / 'my_rig.yaml').write_text(STIFF)
     subprocess.run(
         [
             sys.executable,
             '-m',
             'dcdrw.cli',
-            'trial',
-            '--rig',
-            'rig.yaml',
+            *FIRST.split()[1:],
             '--initial-phase',
             '35',
             '--seconds',
@@ -56,8 +54,6 @@ def live_trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
             '--note',
             'first: "with" new springs',
             '--quiet',
-            '--out',
-            'out',
         ],
         cwd=folder,
         env={**os.environ, 'PYTHONPATH': str(ROOT)},
@@ -65,4 +61,4 @@ def live_trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
         timeout=PATIENCE,
         stdout=subprocess.DEVNULL,
     )
-    return folder / 'out'
+    return folder / 'trials' / 'first'

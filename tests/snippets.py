@@ -1,4 +1,4 @@
-"""The commands and examples that stand in README and docs, found as a reader of Markdown finds them."""
+"""The commands and examples that stand in README, docs and tutorials, found as a reader of Markdown finds them."""
 
 import re
 import shlex
@@ -10,15 +10,12 @@ from markdown_it import MarkdownIt
 
 from tests import ROOT
 
-PAGES = [ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *sorted((ROOT / 'docs').glob('**/*.md'))]
-
-ELSEWHERE = {
-    **dict.fromkeys(('.', 'cd', 'cp', 'mkdir'), 'the shell has it'),
-    **dict.fromkeys(('git', 'colcon', 'rosdep', 'apt'), "needs the reader's own workspace"),
-    **dict.fromkeys(('ssh', 'rviz2', 'v4l2-ctl'), 'needs hardware, a display or another machine'),
-}
-"""Programs that no test runs, and why."""
-PROGRAMS = {'dcdrw', 'ros2', 'make', 'python', 'pip', 'share=$(ros2', *ELSEWHERE}
+PAGES = [
+    ROOT / 'README.md',
+    ROOT / 'CONTRIBUTING.md',
+    *sorted((ROOT / 'docs').glob('*.md')),
+    *sorted((ROOT / 'docs' / 'tutorials').glob('*.py')),
+]
 
 
 class Snippet(NamedTuple):
@@ -32,27 +29,37 @@ class Snippet(NamedTuple):
         return f'{self.page.relative_to(ROOT)}:{self.line}'
 
 
-def blocks(language: str = '') -> Iterator[Snippet]:
-    """Blocks of code in a language; without one, those that are indented."""
+class Command(NamedTuple):
+    """A command, as the shell would split it, and what it needs beyond this package; empty where it needs nothing."""
+
+    place: Snippet
+    words: tuple[str, ...]
+    needs: str
+
+
+def blocks(language: str) -> list[Snippet]:
+    """Blocks of code in a language."""
+    return [snippet for info, snippet in fences() if info == language]
+
+
+def fences() -> Iterator[tuple[str, Snippet]]:
+    """Every block of code that is not indented, with what it says that it is."""
     for page in PAGES:
         for token in _tokens(page):
-            if token.type in ('fence', 'code_block') and token.info == language:
-                yield Snippet(page, token.map[0] + 1, token.content)
+            if token.type == 'fence':
+                yield token.info, Snippet(page, token.map[0] + 1, token.content)
 
 
-def commands() -> Iterator[tuple[Snippet, list[str]]]:
-    """Every command that stands in a block, as the shell would split it."""
-    for block in blocks():
-        if block.code.split(maxsplit=1)[0] not in PROGRAMS:  # an equation, a file, what a command prints
-            assert not re.search(r'^dcdrw ', block.code, re.MULTILINE), str(block)
-            continue
-        lines = block.code.replace('\\\n', ' ').splitlines()
-        for number, line in enumerate(lines):
-            words = shlex.split(line, comments=True)
-            while words:
-                end = words.index('&&') if '&&' in words else len(words)
-                yield Snippet(block.page, block.line + number, line), words[:end]
-                words = words[end + 1 :]
+def commands() -> Iterator[Command]:
+    """Every command: blocks that are indented hold nothing else.
+
+    A comment that begins with `needs` says what a command needs: at the end of its line, or on a line of its own for
+    the rest of the block.
+    """
+    for page in PAGES:
+        for token in _tokens(page):
+            if token.type == 'code_block':
+                yield from _commands(Snippet(page, token.map[0] + 1, token.content))
 
 
 def inline() -> Iterator[Snippet]:
@@ -74,5 +81,32 @@ def targets() -> Iterator[Snippet]:
                     yield Snippet(page, token.map[0] + 1 if token.map else 0, target)
 
 
+def _commands(block: Snippet) -> Iterator[Command]:
+    needed = ''
+    for number, line in enumerate(block.code.replace('\\\n', ' ').splitlines()):
+        said = re.search(r'(?:^|\s)# (needs .*)', line)
+        words = shlex.split(line, comments=True)
+        if said and not words:
+            needed = said[1]
+        needs = f'{needed} {said[1] if said else ""}'.strip()
+        while words:
+            end = words.index('&&') if '&&' in words else len(words)
+            yield Command(block._replace(line=block.line + number, code=line), tuple(words[:end]), needs)
+            words = words[end + 1 :]
+
+
 def _tokens(page: Path) -> list:
-    return MarkdownIt('commonmark').enable('table').parse(page.read_text(encoding='utf-8'))
+    text = page.read_text(encoding='utf-8')
+    return MarkdownIt('commonmark').enable('table').parse(text if page.suffix == '.md' else _told(text))
+
+
+def _told(script: str) -> str:
+    """The Markdown of a tutorial, each line where it stands; what is code is empty lines."""
+    lines, told = [], False
+    for line in script.splitlines():
+        if line.startswith('# %%'):
+            told = '[markdown]' in line
+            lines.append('')
+        else:
+            lines.append(line.removeprefix('#').removeprefix(' ') if told else '')
+    return '\n'.join(lines)

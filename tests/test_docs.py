@@ -1,140 +1,45 @@
-"""The docs say what the code does: their commands, examples, links and tables."""
+"""The docs say what the code does: their examples, links, tables and what they quote."""
 
 import re
 import runpy
-import shlex
-import shutil
-from configparser import ConfigParser
-from glob import glob
-from itertools import pairwise
 
 import pytest
 
-from dcdrw.cli import COMMANDS, main
-from dcdrw.command_line import CommandLine
+from dcdrw import preset, simulate
 from dcdrw.suite.executables import EXECUTABLES
-from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
+from dcdrw.suite.parameter_file import TrialParams, read_parameter_file, read_uncertainty
 from dcdrw.suite.tables import updated
-from dcdrw_msgs_py.quantity import fields
 from tests import ROOT
-from tests.snippets import ELSEWHERE, PAGES, blocks, commands, inline, targets
-from tests.trials import STIFF
-
-QUICK = {'legs', 'map', 'simulate', 'tags', 'urdf'}
-"""Commands that are run as they stand in the docs. Of the others the arguments are read; their own tests run them."""
-ON_TRIALS = {'analyze', 'control', 'mend', 'models', 'report'}
-"""Likewise, where `trials` and recordings lie that were made before."""
-NODES = {node.name: {field.name for params in node.parameters for field in fields(params)} for node in EXECUTABLES}
-TOPICS = {topic.name.lstrip('/'): topic.type for node in EXECUTABLES for topic in (*node.subscribes, *node.publishes)}
-SERVICES = {
-    f'/{node.name}/{name}': type_.rstrip(')')
-    for node in EXECUTABLES
-    for name, type_ in (service.removeprefix('~/').split(' (') for service in node.services)
-}
-STANDING = list(commands())
+from tests.snippets import blocks, fences, inline, targets
 
 
-def dcdrw(words: list[str]) -> None:
-    _, unknown = CommandLine(COMMANDS, '', '').parser.parse_known_args(words)
-    assert not unknown
+def test_every_block_says_what_it_is():
+    """What is indented is commands (tests/test_docs_commands.py); all else has a language, and a test that reads it."""
+    for language, block in fences():
+        assert language.startswith(('python', 'yaml', 'text', '{')) or block.page.name == 'CONTRIBUTING.md', str(block)
+        assert not re.search(r'^(\$ )?(dcdrw|ros2|python|pip|make) ', block.code, re.MULTILINE), str(block)
 
 
-def ros2(words: list[str]) -> None:
-    match words:
-        case ['run', 'dcdrw', 'dcdrw', *rest]:
-            dcdrw(rest)
-        case ['run', 'dcdrw', node, *rest]:
-            assert node in {*NODES, 'suite'}
-            for before, assignment in pairwise(rest):
-                if before == '-p':
-                    assert assignment.split(':=')[0] in NODES[node]
-        case ['launch', 'dcdrw', file, *rest]:
-            assert (ROOT / 'launch' / file).exists()
-            text = (ROOT / 'launch' / 'dcdrw.launch.py').read_text(encoding='utf-8')
-            for argument in rest:
-                assert argument == '--show-args' or f"    '{argument.split(':=')[0]}': (" in text
-        case ['topic', *_]:
-            (topic,) = (word for word in words if word.startswith('/'))
-            kind = [word for word in words if '/msg/' in word]
-            assert kind in ([], [TOPICS[topic.lstrip('/')]])
-        case ['service', 'call', service, kind, *_]:
-            assert SERVICES[service] == kind
-        case ['param', 'set', node, name, _]:
-            assert name in NODES[node.lstrip('/')]
-        case [('run' | 'pkg'), *_]:  # another package's, which is not here
-            pass
-        case _:
-            raise AssertionError('what does ros2 do with this?')
+@pytest.mark.parametrize('block', blocks('yaml'), ids=str)
+def test_a_parameter_file_is_read(block, tmp_path):
+    path = tmp_path / 'rig.yaml'
+    path.write_text(block.code, encoding='utf-8')
+    assert read_parameter_file(path, TrialParams()) != TrialParams()
+    assert (read_uncertainty(path) is not None) == ('uncertainty:' in block.code)
 
 
-def make(words: list[str]) -> None:
-    assert re.search(rf'^{words[0]}:', (ROOT / 'Makefile').read_text(encoding='utf-8'), re.MULTILINE)
+def test_a_diagram_names_nodes_topics_and_packages_that_there_are():
+    there = {topic.name for node in EXECUTABLES for topic in (*node.subscribes, *node.publishes)}
+    there |= {node.name for node in EXECUTABLES} | {path.name for path in ROOT.glob('dcdrw_*')}
+    there |= {'joint_trajectory_controller'}
+    for block in blocks('text'):
+        if '▶' in block.code:
+            assert set(re.findall(r'\b[a-z/]+_[a-z_]+\b', block.code)) <= there, str(block)
 
 
-def pip(words: list[str]) -> None:
-    setup = ConfigParser()
-    setup.read(ROOT / 'setup.cfg')
-    for extras in re.findall(r'\[(.*?)\]', ' '.join(words)):
-        known = {'distributed', *setup['options.extras_require']}
-        assert set(extras.split(',')) <= known
-
-
-def python(words: list[str]) -> None:
-    assert (ROOT / words[0]).exists()
-
-
-READERS = {'dcdrw': dcdrw, 'ros2': ros2, 'make': make, 'pip': pip, 'python': python}
-
-
-@pytest.mark.parametrize(('snippet', 'words'), STANDING, ids=[str(snippet) for snippet, _ in STANDING])
-def test_every_command_takes_its_arguments(snippet, words, capsys):
-    program = words[0].removeprefix('.venv/bin/')
-    if program not in READERS:
-        assert program in ELSEWHERE or program.startswith('share=') or program == 'pre-commit'
-        return
-    status: object = None
-    try:
-        READERS[program](words[1:])
-    except SystemExit as end:  # by --help, or by what the parser refuses
-        status = end.code
-    assert not status, capsys.readouterr().err
-
-
-@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
-def test_quick_commands_of_a_page_run(page, tmp_path, monkeypatch, capsys):
-    (tmp_path / 'tests').symlink_to(ROOT / 'tests')
-    shutil.copy(ROOT / 'config' / 'rig.yaml', tmp_path / 'my_rig.yaml')
-    shutil.copy(ROOT / 'tests' / 'data' / 'strikes.json', tmp_path / 'case.json')
-    monkeypatch.chdir(tmp_path)
-    for snippet, words in STANDING:
-        if snippet.page == page and words[0] == 'dcdrw' and words[1] in QUICK:
-            assert main(words[1:]) == 0, (str(snippet), capsys.readouterr().err)
-
-
-@pytest.mark.processes
-@pytest.mark.parametrize(
-    'line', sorted({shlex.join(words) for _, words in STANDING if words[0] == 'dcdrw' and words[1] in ON_TRIALS})
-)
-def test_commands_on_trials_run(line, live_trial, tmp_path, monkeypatch, capsys):
-    for trial in ('first', 'second'):
-        shutil.copytree(live_trial, tmp_path / 'trials' / trial)
-    for bag in ('my_bag', 'killed_bag'):
-        shutil.copytree(live_trial / 'recording', tmp_path / bag)
-    (tmp_path / 'my_rig.yaml').write_text(STIFF)
-    monkeypatch.chdir(tmp_path)
-    words = [path for word in shlex.split(line)[1:] for path in sorted(glob(word)) or [word]]
-    assert main(words) == 0, capsys.readouterr().err
-
-
-def test_commands_within_sentences_exist():
-    known = CommandLine(COMMANDS, '', '').commands
-    for snippet in inline():
-        if snippet.code.startswith('dcdrw ') and not snippet.code.startswith('dcdrw --'):
-            name, *rest = shlex.split(snippet.code)[1:]
-            assert name in known, str(snippet)
-            known[name].load()
-            options = {word.split('=')[0] for word in rest if word.startswith('--')}
-            assert options <= set(known[name].option_strings), str(snippet)
+def test_the_verdict_in_the_readme_is_that_of_the_papers_trial():
+    (told,) = (block.code for block in blocks('text') if block.page.name == 'README.md')
+    assert told.strip() == simulate(preset('paper'), phase=0.216, seconds=30.0).summary.sentence
 
 
 def test_links_lead_somewhere():
@@ -176,7 +81,7 @@ def test_what_takes_a_minute_runs_with_fewer_starts(capsys):
     assert "('IN_STEP', np.int64(20))" in told, 'with the stiff damper'
 
 
-@pytest.mark.parametrize('snippet', list(blocks('python')), ids=str)
+@pytest.mark.parametrize('snippet', blocks('python'), ids=str)
 def test_example_runs_as_it_stands(snippet, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'example.py').write_text(snippet.code, encoding='utf-8')

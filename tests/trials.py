@@ -9,6 +9,8 @@ from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw_msgs_py.samples import JointSample
 from dcdrw_msgs_py.topics import COUPLER, FRONT_WHEEL, REAR_WHEEL
 
+FIRST = 'dcdrw trial --rig my_rig.yaml --out trials/first'
+"""As the docs have it: what `live_trial` runs, with a rig and options of its own."""
 STIFF = '/**:\n  ros__parameters:\n    k: 60\n    rate: 200\n'
 
 

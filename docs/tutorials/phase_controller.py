@@ -84,6 +84,7 @@ for phase in (0.1, 0.216, 0.7):
 # rest: bounds on force, slew and power, a heartbeat, and a state machine that ends in zero force whatever fails.
 #
 #     dcdrw control --rig my_rig.yaml --out gains.yaml
+#     # needs a ROS 2; in .venv: synchronizer --ros-args ...
 #     ros2 run dcdrw synchronizer --ros-args --params-file gains.yaml
 #     ros2 topic pub --rate 20 /enable std_msgs/msg/Bool '{data: true}'
 #

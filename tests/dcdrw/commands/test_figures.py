@@ -9,19 +9,16 @@ from dcdrw.commands import figures
 from dcdrw_sim.study.sweep import compute, papers_sweep
 from dcdrw_sim.study.sweep_dataset import open_sweep, sweep_of
 from tests.drawn import readable_figures
+from tests.reader import FEWER
 
 pytest.importorskip('matplotlib')
 pytest.importorskip('netCDF4')
 
-SECONDS = 40.0
-
 
 @pytest.fixture(autouse=True)
 def few_points(monkeypatch):
-    monkeypatch.setattr(figures.Book, 'points', lambda book, full: 5)
-    monkeypatch.setattr(figures, 'LONG', SECONDS)
-    monkeypatch.setattr('dcdrw_sim.figures.regime_figures.CURVE_POINTS', 3)
-    monkeypatch.setattr('dcdrw_sim.figures.sweep_figures.SAMPLES', 100)
+    for name, few in FEWER.items():
+        monkeypatch.setattr(name, few)
 
 
 def draw(tmp_path, *options):

@@ -90,7 +90,7 @@ def test_page_is_self_contained_and_tells_each_trial(report):
     assert 'A <day>' in words
     assert 'first: "with" new springs' in words  # the operator's note
     assert text.count('<svg') == 6  # the overlays by steps and by time, and two for each trial
-    assert {'out', 'bag'} <= set(page.words)
+    assert {'first', 'bag'} <= set(page.words)
 
 
 def test_contraction_is_one_number_in_every_place(report, live_trial):
