@@ -34,6 +34,8 @@ UNEVEN = 20.0
 """By how much a third difference is more uneven, in the mean square, than the four values that it is made of."""
 SAME = 0.02
 """But for this share, a wheel's speeds before and after a strike must tell how far it turned."""
+ROUNDING = 1e-6
+"""An error that is further beyond the band's edge is not on it [%]: large rotations leave so much open."""
 FASTEST = 100.0
 """A speed beyond this is not a measurement [rad/s]."""
 LONG_WAY = 0.1
@@ -277,7 +279,7 @@ class SyncMonitor:
         self._usual = phase.step_difference, phase.step_difference
         self._swing = self._error, self._error
         self._struck_ns = {FRONT: phase.stamp_ns, REAR: phase.stamp_ns}
-        self._since = in_step_from(0, 0, self._error, self._error, self.params.band_percent)
+        self._since = in_step_from(0, 0, self._error, self._error, self.params.band_percent + ROUNDING)
         return self._sample(phase)
 
     def _restart(self, phase: PhaseSample) -> SyncSample:
@@ -318,7 +320,7 @@ class SyncMonitor:
         """Hold the error against the band: here, and at the strikes on the way."""
         params, strikes = self.params, self._steps + front
         self._resolution = round(100.0 * phase.resolution, 6)
-        edge = params.band_percent
+        edge = params.band_percent + ROUNDING
         if self._since <= self._steps:  # a whole step, or more, in the band
             edge += min(params.band_hysteresis_percent, self._stray)
         is_gap = self._cadence.is_gap(dt)

@@ -443,3 +443,19 @@ def test_wheels_that_a_hand_moves_by_less_than_a_degree_are_held(at):
     summary = summarize(trial(moved))
     assert (summary.state, summary.reason) == (PairState.HELD, 'the wheels were held all the time')
     assert summarize(trial(moved + later(WALK, 4.0))).sentence == summarize(trial(WALK)).sentence
+
+
+@pytest.mark.parametrize('percent', [44.0, 56.0])
+@pytest.mark.parametrize('zero', [0.0, 1000.0, 30000.0])
+def test_an_error_on_the_edge_of_the_band_is_within(percent, zero):
+    pitch = SyncParams().front.alpha * 2.0
+    psi = [-0.5 * pitch + round(zero / pitch) * pitch + i / RATE for i in range(10 * RATE)]
+    samples = [
+        JointSample(SECOND + i * SECOND // RATE, Turn(angle, 1.0), Turn(angle - percent / 100.0 * pitch, 1.0))
+        for i, angle in enumerate(psi)
+    ]
+    assert summarize(trial(samples)).steps_to_synchronization == 0
+    outside = [
+        sample._replace(rear=Turn(sample.rear.angle - math.copysign(1e-4, percent - 50.0), 1.0)) for sample in samples
+    ]
+    assert summarize(trial(outside)).state is PairState.CONVERGING
