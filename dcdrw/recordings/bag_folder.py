@@ -101,6 +101,9 @@ def _metadata(path: Path) -> tuple[dict[str, Any], list[str]]:
         content = read_yaml(path)
     except ValueError as error:
         return {}, [f'{error}; the recording is read without it']
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        return {}, [f'{path}: {reason}; the recording is read without it']
     told = content.get(INFORMATION) if isinstance(content, dict) else None
     return (
         (told, []) if isinstance(told, dict) else ({}, [f'{path} is none of rosbag2; the recording is read without it'])

@@ -1,9 +1,11 @@
 """sqlite3 files of rosbag2, read whatever befell them, and without a trace beside them.
 
 sqlite3 itself would lock the file, and write where a recorder was killed: it rolls back or forward what stands in the
-file's journal. So a file with a journal is copied with it, and the copy is opened.
+file's journal. So a file with a journal is copied with it, and the copy is opened. It refuses a file that is shorter
+than its first page tells: a copy is made as long again, with pages of zeros in the place of those that are missing.
 """
 
+import os
 import shutil
 import sqlite3
 from collections.abc import Collection, Iterator
@@ -47,14 +49,20 @@ class SqliteFile(BagFile):
     def __init__(self, path: Path, name: str, scratch: Path) -> None:
         super().__init__(path, name)
         with path.open('rb') as file:
-            start = file.read(64)
+            start = file.read(100)
         if start.startswith(b'version https://git-lfs'):
             raise ValueError(f'{name} is a pointer of Git LFS, not the recording itself: run git lfs pull')
         journals = [journal for journal in _journals(path) if journal.stat().st_size]
         if not journals and not start.startswith(_MAGIC):
             raise ValueError(f'{name} is {"not an sqlite3 file" if start else "empty"}')
-        if journals:
+        page, pages = _pages(start)
+        size, told = path.stat().st_size, 0 if journals else page * pages
+        if journals or size < told:
             path = _copy(path, scratch / 'copy.db3')
+        if size < told:
+            os.truncate(path, size - size % page)
+            os.truncate(path, told)
+            self._damage['end'] = f'{name} is cut off: {size} of {told} bytes are there'
         self.closed = not journals
         self._size = path.stat().st_size + sum(journal.stat().st_size for journal in _journals(path))
         uri = f'{path.resolve().as_uri()}?{"mode=rw" if journals else "mode=ro&immutable=1"}'
@@ -223,6 +231,12 @@ class SqliteFile(BagFile):
         """Whether a query has taken more steps than any honest one over a file of this size."""
         self._steps += _STEPS
         return self._steps > 10_000_000 + 10 * self._size
+
+
+def _pages(header: bytes) -> tuple[int, int]:
+    """The size of a page [bytes] and their number by the first of them; 0 where it does not tell of the last change."""
+    size, count = int.from_bytes(header[16:18], 'big'), int.from_bytes(header[28:32], 'big')
+    return 65536 if size == 1 else size, count if header[24:28] == header[92:96] else 0
 
 
 def _journals(path: Path) -> list[Path]:

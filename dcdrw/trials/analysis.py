@@ -205,8 +205,11 @@ class _Trial:
         joints = self._params.phase
         error = batch.error or _missing(batch.names, (joints.front_joint, joints.rear_joint))
         if error:
-            self._estimator.refuse('unreadable', batch.messages)
-            self._received += batch.messages
+            if batch.error or {joints.front_joint, joints.rear_joint} & set(batch.names):
+                self._estimator.refuse('unreadable', batch.messages)
+                self._received += batch.messages
+            else:
+                self._estimator.note_foreign(batch.messages)
             self._unreadable = error
             return
         batch = self._dated(batch)

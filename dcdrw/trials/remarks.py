@@ -84,6 +84,11 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         yield Remark(
             f'{counted(estimator.unstamped, "joint state")} had no stamp of use: the time of recording took its place.'
         )
+    if estimator.foreign:
+        yield Remark(
+            f'{counted(estimator.foreign, "message")} {by_count(estimator.foreign, "names", "name")} neither wheel, '
+            f'and {by_count(estimator.foreign, "is", "are")} none of this rig.'
+        )
     if estimator.duplicates:
         again = by_count(estimator.duplicates, 'it was, and counts', 'they were, and count')
         yield Remark(f'{counted(estimator.duplicates, "joint state")} came again as {again} once.')

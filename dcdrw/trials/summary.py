@@ -27,6 +27,8 @@ class Samples(NamedTuple):
     """When the source started anew."""
     clock_steps: tuple[ClockStep, ...]
     """Times that the clock of the source was set, which are undone."""
+    foreign: int
+    """Messages that name neither wheel."""
     unstamped: int
     """Without a stamp, so that the time of recording took its place."""
     duplicates: int
@@ -121,6 +123,7 @@ def summarize(trial: Analysis) -> Summary:
             refused=trial.estimator.refusals,
             restarts=trial.estimator.restarted,
             clock_steps=trial.estimator.clock_steps,
+            foreign=trial.estimator.foreign,
             unstamped=trial.estimator.unstamped,
             duplicates=trial.estimator.duplicates,
             rollovers=trial.estimator.rollovers,

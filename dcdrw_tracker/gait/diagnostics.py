@@ -90,6 +90,7 @@ def diagnose_phase(status: PhaseStatus, age: float, stale_after: float) -> Diagn
             REFUSED: sum(status.refused.values()),
             **{f'{REFUSED}: {why}': count for why, count in status.refused.items()},
             RESTARTS: status.restarts,
+            'messages that name neither wheel': status.foreign,
             'samples without a stamp': status.unstamped,
             'samples that came twice': status.duplicates,
             'times the clock of the source was set': len(status.clock_steps),

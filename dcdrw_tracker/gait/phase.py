@@ -146,6 +146,8 @@ class PhaseStatus(NamedTuple):
     """Times that the counter of an encoder rolled over, which was made good."""
     unstamped: int = 0
     """Samples whose stamp was missing (zero), so that the time of their arrival took its place."""
+    foreign: int = 0
+    """Messages that name neither wheel, and so are none of this rig's."""
     duplicates: int = 0
     """Samples that came again as they were, and so cost nothing."""
     disbelieved: int = 0
@@ -179,7 +181,7 @@ class PhaseEstimator:
         self._cadence = Cadence()
         self._refused: dict[Refusal, int] = dict.fromkeys(get_args(Refusal), 0)
         self._refusal: Refusal | None = None
-        self._accepted = self._unstamped = self._duplicates = self._too_fast = 0
+        self._accepted = self._unstamped = self._foreign = self._duplicates = self._too_fast = 0
         self._slow_strikes: int | None = 0
         self._restarts = self._rolled_before = 0
         self._restarted: deque[Restart] = deque(maxlen=REMEMBERED)
@@ -210,6 +212,12 @@ class PhaseEstimator:
         """Count samples that are of no use; callers report what they cannot even convert (`unreadable`)."""
         self._refused[why] += samples
         self._refusal = why
+
+    def note_foreign(self, messages: int = 1) -> None:
+        """Count messages that name neither wheel: another robot's, unless the wheels have other names."""
+        self._foreign += messages
+        if not self._accepted:
+            self._refusal = 'unreadable'
 
     def note_unstamped(self, samples: int) -> None:
         """Count samples to which the caller gave the time of their arrival, for want of a stamp."""
@@ -290,6 +298,7 @@ class PhaseEstimator:
             rear_steps=self._rear.steps,
             rollovers=self._rolled_before + self._front.rollovers + self._rear.rollovers,
             unstamped=self._unstamped,
+            foreign=self._foreign,
             duplicates=self._duplicates,
             disbelieved=max(self._front.disbelieved, self._rear.disbelieved),
             clock_steps=tuple(self._clock_steps),

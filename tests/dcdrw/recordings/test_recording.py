@@ -411,6 +411,34 @@ def test_sqlite_recording_in_progress_is_read_and_locks_nobody_out(tmp_path):
     writer.close()
 
 
+@settings(max_examples=20, suppress_health_check=list(HealthCheck))
+@given(share=st.floats(0.5, 1.0, exclude_max=True))
+def test_sqlite_recording_that_is_cut_off_is_read_as_far_as_it_goes(sqlite_bag, tmp_path_factory, share):
+    path = tmp_path_factory.mktemp('cut') / 'bag.db3'
+    content = sqlite_bag.read_bytes()
+    path.write_bytes(content[: int(share * len(content))])
+    with Recording(path) as recording:
+        read = [message.data for message in recording.messages(['/joint_states'])]
+        assert 'is cut off' in recording.damage[0]
+    assert read == [data for _, data in MESSAGES][: len(read)]
+    assert len(read) >= (share - 0.4) * len(MESSAGES)
+    assert path.stat().st_size == int(share * len(content))
+
+
+@pytest.mark.parametrize('metadata', ['a folder', 'damaged'])
+def test_metadata_that_cannot_be_read_cost_nothing_but_a_note(metadata, tmp_path):
+    bag = write_bag(tmp_path / 'bag', MESSAGES)
+    (bag / 'metadata.yaml').unlink()
+    if metadata == 'a folder':
+        (bag / 'metadata.yaml').mkdir()
+    else:
+        (bag / 'metadata.yaml').write_text('a: [')
+    with Recording(bag) as recording:
+        assert recording.count('/joint_states') == len(MESSAGES)
+        assert 'the recording is read without it' in recording.notes[0]
+        assert not recording.damage
+
+
 @settings(max_examples=40, suppress_health_check=list(HealthCheck))
 @given(share=st.floats(0.0, 1.0, exclude_max=True), filling=st.integers(0, 255))
 def test_damaged_page_of_a_sqlite_recording_costs_its_rows(sqlite_bag, tmp_path_factory, share, filling):

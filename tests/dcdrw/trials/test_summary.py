@@ -459,3 +459,17 @@ def test_an_error_on_the_edge_of_the_band_is_within(percent, zero):
         sample._replace(rear=Turn(sample.rear.angle - math.copysign(1e-4, percent - 50.0), 1.0)) for sample in samples
     ]
     assert summarize(trial(outside)).state is PairState.CONVERGING
+
+
+@pytest.mark.parametrize('first', [0, 1])
+def test_messages_of_another_robot_take_nothing_from_the_verdict_and_are_told(first):
+    """Joints of other names are ignored, also where none of them is this rig's."""
+    samples = rolled(RATE)
+    arm = batch(samples[:1])._replace(names=('shoulder', 'elbow', 'wrist'))
+    pieces = [batch(samples[i : i + 100]) for i in range(0, len(samples), 100)]
+    summary = summarize(
+        analyze([one for piece in pieces for one in ((arm, piece), (piece, arm))[first]], TrialParams())
+    )
+    assert (summary.steps_to_synchronization, summary.complete, summary.samples.refused) == (38, True, {})
+    assert summary.samples.foreign == len(pieces)
+    assert f'{len(pieces)} messages name neither wheel' in summary.sentence
