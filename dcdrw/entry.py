@@ -30,6 +30,7 @@ def run(name: str) -> int:
     """Run an executable; returns its exit status."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _end)
+    keep_to_one_core()
     status: int
     if name != 'dcdrw' and {'-h', '--help'} & set(sys.argv[1:]):
         status = import_module('dcdrw.suite.node_help').show(name)
@@ -40,6 +41,14 @@ def run(name: str) -> int:
         sys.stderr.flush()
         os._exit(status)
     return status
+
+
+def keep_to_one_core() -> None:
+    """Let numpy, which is imported later, do linear algebra in one thread, unless the environment says otherwise.
+
+    The matrices are small: several threads wait for each other, on a busy machine for ten times as long as one takes.
+    """
+    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 
 def _end(number: int, _: object) -> None:
