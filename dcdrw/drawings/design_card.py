@@ -1,6 +1,7 @@
 """The card of a design: one page to keep beside the rig."""
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from textwrap import fill
 from typing import Any, NamedTuple
@@ -80,7 +81,8 @@ class _Box(NamedTuple):
 
 
 def _wrapped(text: str) -> str:
-    return '\n'.join(fill(line, LETTERS, subsequent_indent='    ') for line in text.split('\n'))
+    kept = re.sub(r'(?<=\d) (?=(?:J|N|mm|m|s)\b|%)', '\N{NO-BREAK SPACE}', text)  # a number and its unit
+    return '\n'.join(fill(line, LETTERS, subsequent_indent='    ') for line in kept.split('\n'))
 
 
 def _write(figure: Any, height: float, title: str, boxes: list[_Box]) -> float:

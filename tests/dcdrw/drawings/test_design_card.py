@@ -28,19 +28,31 @@ def assessment(steps):
     )
 
 
-@pytest.mark.parametrize('names', [['fastest', 'most forgiving'], ['fastest', 'most forgiving', 'surest', 'given']])
-@pytest.mark.parametrize('steps', [5.0, 300.0, NAN], ids=['quick', 'slow', 'stalls'])
-def test_no_text_covers_another(names, steps):
+def card_of(names, said, large, steps):
     k, b = mesh((0.01, 100.0), (0.3, 3000.0))
     known = np.full(GRID**2, steps)
     grid = Scores(k, b, np.full(GRID**2, 0, np.int8), known, known, known, known)
-    said = '\n'.join([f'COUPLER {"word " * 15}', *['what: ' + 'so many words of it; ' * 8] * 5, 'and: this'])
-    large = dict.fromkeys(names, 'In step only above 1.97°, stalls at 1.67° and below') | {names[-1]: ''}
     with for_print():
-        card = draw_card(
+        return draw_card(
             'Two wheels', dict.fromkeys(names, said), large, TASK, grid, dict.fromkeys(names, assessment(steps)),
             {'spring': [5.0], 'dashpot': [8.0]},
         )  # fmt: skip
+
+
+def test_a_unit_stands_in_the_line_of_its_number():
+    said = '\n'.join('x' * begin + ' 94 J of heat, 0.4 m/s, 20 N, 5 %' * 8 for begin in range(1, 12))
+    card = card_of(['fastest'], said, {'fastest': ''}, 5.0)
+    lines = [line.strip() for text in card.texts for line in text.get_text().splitlines()]
+    assert len(lines) > 22
+    assert not [line for line in lines if line.startswith(('J', 'm/s', 'N', '%'))]
+
+
+@pytest.mark.parametrize('names', [['fastest', 'most forgiving'], ['fastest', 'most forgiving', 'surest', 'given']])
+@pytest.mark.parametrize('steps', [5.0, 300.0, NAN], ids=['quick', 'slow', 'stalls'])
+def test_no_text_covers_another(names, steps):
+    said = '\n'.join([f'COUPLER {"word " * 15}', *['what: ' + 'so many words of it; ' * 8] * 5, 'and: this'])
+    large = dict.fromkeys(names, 'In step only above 1.97°, stalls at 1.67° and below') | {names[-1]: ''}
+    card = card_of(names, said, large, steps)
     card.draw_without_rendering()
     written = [text for text in card.texts if text.get_text()]
     boxes = [(text.get_bbox_patch() or text).get_window_extent() for text in written]
