@@ -9,6 +9,8 @@ from dcdrw import preset, simulate
 from dcdrw.suite.executables import EXECUTABLES
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file, read_uncertainty
 from dcdrw.suite.tables import updated
+from dcdrw_msgs_py.messages import PhaseSampleWriter
+from dcdrw_msgs_py.samples import PhaseSample, Turn
 from tests import ROOT
 from tests.snippets import blocks, fences, inline, targets
 
@@ -40,6 +42,13 @@ def test_a_diagram_names_nodes_topics_and_packages_that_there_are():
 def test_the_verdict_in_the_readme_is_that_of_the_papers_trial():
     (told,) = (block.code for block in blocks('text') if block.page.name == 'README.md')
     assert told.strip() == simulate(preset('paper'), phase=0.216, seconds=30.0).summary.sentence
+
+
+@pytest.mark.parametrize('page', ['contract.md', 'reference.md'])
+def test_phase_state_is_told_name_by_name(page):
+    (told,) = re.findall(r'^- `phase_state`.*?(?=^- )', (ROOT / 'docs' / page).read_text(), re.MULTILINE | re.DOTALL)
+    sample = PhaseSample(1, *[Turn(0.0, 0.0)] * 3, 0, 0, 0, 0, sources=2, resolution=0.1)
+    assert set(re.findall(r'`(\w+)`', told)) == {'phase_state', *PhaseSampleWriter().write(sample).name}
 
 
 def test_links_lead_somewhere():
