@@ -23,6 +23,8 @@ LETTERS = 130
 """Of a line."""
 LINE = 0.138
 """Height of a line of POINTS [inch]."""
+LEFT, WIDTH = 0.05, 0.92
+"""Of the frame about what is said of a coupler, as parts of the page."""
 LARGE, LARGE_POINTS = 2.3, 16
 """Lines that large print takes, and its size."""
 LONGEST = 60
@@ -87,14 +89,17 @@ def _wrapped(text: str) -> str:
 
 def _write(figure: Any, height: float, title: str, boxes: list[_Box]) -> float:
     """Write the words; returns where they end, as a part of the page."""
+    from matplotlib.patches import Rectangle
+
     line, place = LINE / height, 1.0 - TOP / height
     figure.text(0.5, 1.0 - 0.6 * TOP / height, title, ha='center', fontsize=13, fontweight='bold')
     for box in boxes:
         figure.text(0.06, place, box.large, va='top', fontsize=LARGE_POINTS, fontweight='bold', color=VERMILION)
         below = place - (LARGE * line if box.large else 0.0)
-        frame = {'facecolor': 'none', 'edgecolor': box.colour, 'linewidth': 1.2, 'pad': 4.0}
-        figure.text(0.06, below, box.text, va='top', fontsize=POINTS, linespacing=1.25, bbox=frame)
+        figure.text(0.06, below, box.text, va='top', fontsize=POINTS, linespacing=1.25)
         place -= box.lines * line
+        corner, height = (LEFT, place + 0.9 * line), (box.lines - 0.5) * line
+        figure.add_artist(Rectangle(corner, WIDTH, height, fill=False, edgecolor=box.colour, linewidth=1.2))
     return place
 
 
