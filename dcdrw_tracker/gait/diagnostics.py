@@ -150,6 +150,8 @@ def _judge_phase(status: PhaseStatus, age: float, stale_after: float) -> tuple[L
 HINTS: dict[Hint, str] = {
     'front_sign': 'the front wheel rolls uphill: is its sign right? (parameter front_sign)',
     'rear_sign': 'the rear wheel rolls uphill: is its sign right? (parameter rear_sign)',
+    'ratio': 'one wheel takes more steps than the other: are the gear ratios of both encoders right, and the spokes? '
+    '(parameters front.spokes and rear.spokes)',
     'rollover': "an encoder's counter rolls over within a turn, perhaps also before the start: where is its zero? "
     '(parameter rollover, which takes a start in its upper half for one below 0)',
     'lone_jump': "one wheel's rotation jumped alone: does its encoder's counter roll over? "

@@ -24,7 +24,7 @@ is not a number, the stamp stands still, goes back or lies ahead of the clock, o
 Cause = Literal['announced', 'stamp', 'rotation']
 """Why the source is taken to have started anew: it says so, its stamps went back, or its rotations jumped."""
 
-Hint = Literal['front_sign', 'rear_sign', 'unit', 'revolutions', 'rollover', 'lone_jump']
+Hint = Literal['front_sign', 'rear_sign', 'unit', 'revolutions', 'ratio', 'rollover', 'lone_jump']
 """A parameter that is probably set wrongly, judged by how the wheels seem to turn."""
 
 LARGEST_ROTATION = 1e9
@@ -33,6 +33,8 @@ UNITS = {'rad': 1.0, 'deg': math.pi / 180.0, 'rev': math.tau}
 """Units in which a source may give its rotations, in rad."""
 UPHILL_STEPS = 3
 """A wheel that has taken so many more steps uphill than downhill has the wrong sign: rocking takes one."""
+FAR_AHEAD = 5
+"""A wheel that has taken so many more steps than the other, and a quarter more, has another gear or other spokes."""
 REMEMBERED = 100
 """Restarts and clock steps of which the particulars are kept."""
 LEAST_CLOCK_STEP_NS = 200_000_000
@@ -332,11 +334,19 @@ class PhaseEstimator:
             hints.append('front_sign')
         if self._rear.steps <= -UPHILL_STEPS:
             hints.append('rear_sign')
+        if self._is_ahead():
+            hints.append('ratio')
         if not (self._front.is_zero_known and self._rear.is_zero_known):
             hints.append('rollover')
         if any(map(self._jumped_alone, self._restarted)):
             hints.append('lone_jump')
         return tuple(hints)
+
+    def _is_ahead(self) -> bool:
+        """Whether one wheel takes far more steps than the other although both turn on."""
+        fewer, more = sorted((self._front.steps, self._rear.steps))
+        turn = min(abs(self._front.pace), abs(self._rear.pace)) >= MOVING
+        return turn and fewer > 0 and more - fewer >= FAR_AHEAD and more >= 1.25 * fewer
 
     def _jumped_alone(self, restart: Restart) -> bool:
         """Whether one wheel alone jumped by more than a step, as a counter does that rolls over."""

@@ -150,7 +150,7 @@ class PosePairs:
         if abs(height - self._level) > OFF_SLOPE:
             raise ValueError(
                 f'the hub of the {wheel} wheel is {abs(height - self._level):.1f} m off the line on which hubs travel: '
-                'it is hidden or carried, or slope and up_axis are not those of the room'
+                'it is hidden or carried, slope and up_axis are not those of the room, or the positions are not in m'
             )
         self._heights.append(height)
         if len(self._heights) >= FEW and (math.isnan(self._level) or len(self._heights) < RECENT):

@@ -473,3 +473,23 @@ def test_messages_of_another_robot_take_nothing_from_the_verdict_and_are_told(fi
     assert (summary.steps_to_synchronization, summary.complete, summary.samples.refused) == (38, True, {})
     assert summary.samples.foreign == len(pieces)
     assert f'{len(pieces)} messages name neither wheel' in summary.sentence
+
+
+@pytest.mark.parametrize(('front', 'rear'), [(2.0, 1.0), (1.0, 2.0), (1.0, 0.5), (1.5, 1.0)])
+def test_a_wheel_that_takes_far_more_steps_than_the_other_is_asked_about(front, rear):
+    """The coupler would be torn: its encoder has another gear."""
+    geared = [
+        sample._replace(front=Turn(front * sample.front.angle), rear=Turn(rear * sample.rear.angle))
+        for sample in rolled(RATE)
+    ]
+    summary = summarize(trial(geared))
+    assert (summary.samples.hints, summary.complete) == (('ratio',), False)
+    assert 'One wheel takes more steps than the other' in summary.sentence
+
+
+def test_a_wheel_that_stands_still_has_no_other_gear():
+    samples = rolled(RATE)
+    stuck = samples[2000].rear.angle
+    seen = [sample if i < 2000 else sample._replace(rear=Turn(stuck, 0.0)) for i, sample in enumerate(samples)]
+    summary = summarize(trial(seen))
+    assert (summary.state, summary.samples.hints) == (PairState.STALLED, ())
