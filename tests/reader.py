@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from tests.bench import Bench
 
 ADDED = {
-    'dcdrw design': '--seconds 6',
+    'dcdrw design': '--seconds 3',
     'dcdrw figures': '--cache cache',
     'dcdrw film': '--fps 30',
     'dcdrw film --out film.mp4': '--seconds 3',

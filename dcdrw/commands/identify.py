@@ -58,7 +58,7 @@ Exit status: 0 the trials are explained, 1 one is not (the sentence says where),
 
 examples:
   dcdrw identify trials/first --rig my_rig.yaml --out identified
-  dcdrw identify trials/* --rig my_rig.yaml --fix mass,slope --out identified
+  dcdrw identify trials/* --rig my_rig.yaml --fix mass,slope --out identified_together
   dcdrw design --rig identified/rig.yaml                 the coupler for that rig, as well as it is known
 """
 
