@@ -30,6 +30,8 @@ NOISE_SPAN = 3.0
 """So many times itself, as root mean square, noise may carry the error from where it is."""
 SURPRISE = 5.0
 """An error further than this from what its past and rate predict is motion, not noise [%]."""
+WILD = 2.0
+"""And further than so many times what noise explains."""
 UNEVEN = 20.0
 """By how much a third difference is more uneven, in the mean square, than the four values that it is made of."""
 SAME = 0.02
@@ -413,7 +415,7 @@ class SyncMonitor:
         """
         surprise = math.remainder(self._error - foretold, 100.0) if math.isfinite(foretold) else math.inf
         wild, self._wild = self._wild, None
-        if self._is_held or abs(surprise) > SURPRISE:
+        if self._is_held or abs(surprise) > max(SURPRISE, WILD * self._stray):
             if wild is None and not self._is_held and math.isfinite(surprise):
                 self._wild, self._smooth = self._error, math.remainder(foretold, 100.0)
                 return

@@ -76,6 +76,14 @@ def test_noise_does_not_unlatch_synchronized() -> None:
     assert monitor.status().losses == 0
 
 
+def test_noise_is_not_taken_for_wild_samples() -> None:
+    """Of 6,000 samples some lie far from where noise has them on average."""
+    monitor, syncs = run(phases(30.0, p0=0.5, noise_deg=0.3))
+    assert monitor.status().strays == 0
+    told = [sync.synchronized for sync in syncs]
+    assert sum(one != other for one, other in pairwise(told)) == 1
+
+
 def test_a_pair_that_settles_outside_the_band_is_never_synchronized() -> None:
     monitor, syncs = run(phases(20.0, p1=0.4))
     assert not any(sync.synchronized for sync in syncs)
