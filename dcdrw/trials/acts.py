@@ -1,7 +1,8 @@
 """What the synchronizer did in a recorded trial, and when, by the stamps of the joint states. Knows no ROS."""
 
 from collections.abc import Iterable, Iterator
-from itertools import pairwise
+from itertools import groupby, pairwise
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -66,5 +67,6 @@ def recorded_acts(recording: Recording, namespace: str, clock: Clock) -> Acts:
     topic = f'{namespace}/{SYNCHRONIZER_STATE.name}'
     if recording.types.get(topic) != SYNCHRONIZER_STATE.type or not clock.runs:
         return ()
-    said = [(log_ns, str(message.data)) for _, log_ns, message in recording.decoded([topic])]
+    every = ((log_ns, str(message.data)) for _, log_ns, message in recording.decoded([topic]))
+    said = [next(told) for _, told in groupby(every, key=itemgetter(1))]  # the same is told again and again
     return tuple(zip(clock.stamps([log_ns for log_ns, _ in said]), (state for _, state in said), strict=True))

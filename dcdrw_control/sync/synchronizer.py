@@ -15,6 +15,8 @@ LawName = Literal['off', 'hold', 'rear']
 LAWS: tuple[LawName, ...] = get_args(LawName)
 MOST_STEPS_APART = 1
 """|n| beyond this is a slipped step."""
+LONGEST_PAUSE = 2.0
+"""A longer time from command to command, in periods, is a pause of this process, and no silence of its input."""
 
 
 class SynchronizerParams(NamedTuple):
@@ -73,7 +75,7 @@ class Synchronizer:
 
     _last: PhaseSample | None
     _heard: float
-    _was_stale: bool
+    _silence: float
     _asked: float
     _struck: list[float]
 
@@ -135,18 +137,19 @@ class Synchronizer:
                 self._struck[i] = now
         if self.params.law != 'off':
             self._law.update(sample)
-        self._last, self._heard = sample, now
+        self._last, self._heard, self._silence = sample, now, 0.0
 
     def command(self, now: float) -> Command:
         """The command at a time.
 
-        A silent input takes the force away at once, and is a fault when it is silent still the next time: a process
-        that could not run for a while asks for a command before it has read what waits.
+        A silent input takes the force away at once, and is a fault where commands were asked for meanwhile: a process
+        that could not run for a while, or a machine that paused, has yet to hear what was said.
         """
         is_stale = now - self._heard > self.params.stale_after
-        if is_stale and self._was_stale:
+        asked_ago = now - self._asked if math.isfinite(self._asked) else 0.0
+        self._silence += min(asked_ago, LONGEST_PAUSE / self.params.rate)
+        if self._silence > self.params.stale_after:
             self.safety.trip('stale')
-        self._was_stale = is_stale
         has_stalled = self._walks and not is_stale and now - min(self._struck) > self.params.stall_after
         if has_stalled:
             self.safety.trip('stalled')
@@ -183,7 +186,7 @@ class Synchronizer:
         """Know nothing of the input any more."""
         self._last = None
         self._heard = -math.inf
-        self._was_stale = True
+        self._silence = math.inf
         self._asked = math.nan
         self._struck = [-math.inf, -math.inf]
         self._law.reset()

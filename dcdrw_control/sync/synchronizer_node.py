@@ -34,6 +34,10 @@ WATCH_SECONDS = 0.1
 """How often other publishers and the clock are looked at [s]."""
 
 
+REPEAT_SECONDS = 1.0
+"""The state is told again after so long: of a message that was lost DDS knows only when the next one comes."""
+
+
 class SynchronizerNode(Node):
     """Converts messages for the `Synchronizer`, and asks it for a command at a fixed rate."""
 
@@ -56,6 +60,7 @@ class SynchronizerNode(Node):
         publish_diagnosis(self, self._diagnose)
         self._timer = self.create_timer(self._period, self._on_timer, clock=steady_clock())
         self.create_timer(WATCH_SECONDS, self._watch, clock=steady_clock())
+        self.create_timer(REPEAT_SECONDS, self._tell_state, clock=steady_clock())
         self._tick()
 
     def say_last_words(self) -> None:
@@ -99,9 +104,12 @@ class SynchronizerNode(Node):
             self._wrench.publish(self._writer.write(command.stamp_ns, command.force, command.torque))
         if command.state is not self._told:
             self._told = command.state
-            self._state.publish(String(data=command.state.value))
+            self._tell_state()
             reason = self._core.safety.reason
             self.get_logger().info(command.state.value + (f': {reason}' if reason else ''))
+
+    def _tell_state(self) -> None:
+        self._state.publish(String(data=self._command.state.value))
 
     def _watch(self) -> None:
         """See what no sample tells."""

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -107,8 +108,11 @@ def test_a_person_s_trial_is_run_closed_loop_and_tells_the_force_on_the_person(t
     with Recording(tmp_path / 'out') as recording:
         recorded = [SYNCHRONIZER_STATE, REAR_TORQUE_COMMAND, COUPLER_WRENCH, PERSON_FORCE, ENABLE]
         assert all(recording.count(f'/{topic.name}') for topic in recorded)
+        told = recording.count(f'/{SYNCHRONIZER_STATE.name}')
     trial, _ = read_trial(tmp_path / 'out')
     assert force['peak'] == np.abs(trial.motion.coupler_force).max(), 'as the picture says'
+    assert told > len(trial.acts), 'what it does is told again and again, lest a lost message hide a fault'
+    assert all(act != other for (_, act), (_, other) in pairwise(trial.acts))
     (begins, _), *_ = [act for act in trial.acts if act[1] == 'active']
     assert -1.0 < (begins - trial.start_ns) / 1e9 < 5.0  # it is enabled when the wheels have been let go
     panels = [axes.get_ylabel() for axes in trial_figure(trial, '').axes]
