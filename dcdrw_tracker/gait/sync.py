@@ -329,12 +329,14 @@ class SyncMonitor:
         is_blind = is_gap and dt > SMOOTHING  # for so long that rates foretell nothing
         if is_blind:
             self._was_seen = False
-        if front or rear:
-            foretold = self._cross(last, phase, front, rear, dt, edge, is_blind)
-        else:
-            foretold = self._smooth + 50.0 * (last.phi.rate + phase.phi.rate) / self._pitch * dt
         before, self._error = self._error, self._percent(phase.phi.angle)
         error = self._error
+        foretold = by_rates = self._smooth + 50.0 * (last.phi.rate + phase.phi.rate) / self._pitch * dt
+        is_wild = math.isfinite(by_rates) and abs(math.remainder(error - by_rates, 100.0)) > self._surprise
+        if front or rear:
+            believed = edge if is_blind or not is_wild else math.inf
+            crossed = self._cross(last, phase, front, rear, dt, believed, is_blind)
+            foretold = by_rates if is_wild else crossed
         is_smooth = not (front or rear or is_gap) and dt <= SMOOTHING
         self._take_noise(math.remainder(error - before, 100.0), dt, is_smooth)
         speed = abs(phase.phi.rate)
@@ -345,7 +347,9 @@ class SyncMonitor:
         elif front:
             self._was_seen = True
         self._steps = strikes
-        self._judge(error if is_blind else foretold, dt, edge)
+        if is_blind:
+            foretold, is_wild = error, False
+        self._judge(foretold, is_wild and not self._is_held, dt, edge)
         if self._stalled(phase.stamp_ns):
             self._since = strikes + 1
         if strikes_in_step(self._since, strikes) >= params.hold_steps:
@@ -377,7 +381,8 @@ class SyncMonitor:
         times = [(time, True) for time in one.strikes] + [(time, False) for time in other.strikes]
         for time, is_front in sorted(times):
             at_strike = math.remainder(error(time), 100.0)
-            self._take_swing(at_strike)
+            if edge < math.inf:
+                self._take_swing(at_strike)
             self._since = in_step_from(self._since, step, at_strike, at_strike, edge)
             if is_front:  # which belongs to the step that it ends and to that which it opens
                 step += 1
@@ -395,6 +400,11 @@ class SyncMonitor:
         """How far noise, or the counts of coarse encoders, may carry the error from where it is [%]."""
         return max(NOISE_SPAN * math.sqrt(self._noise2), self._resolution)
 
+    @property
+    def _surprise(self) -> float:
+        """How far from where its rates take it an error is wild [%]."""
+        return max(SURPRISE, WILD * self._stray)
+
     def _take_noise(self, moved: float, dt: float, is_smooth: bool) -> None:
         """Measure noise by the third difference of the error: that of a motion seen evenly without a strike is none."""
         if not is_smooth:
@@ -408,28 +418,28 @@ class SyncMonitor:
             self._watched = min(self._watched + dt, NOISE_MEMORY)
             self._noise2 += (noise2 - self._noise2) * min(dt / self._watched, 1.0)
 
-    def _judge(self, foretold: float, dt: float, edge: float) -> None:
+    def _judge(self, foretold: float, is_wild: bool, dt: float, edge: float) -> None:
         """Hold the error against the band: that which its past and rate foretell, drawn as far as noise explains.
 
-        One that is elsewhere waits for the next: where that goes on from what was foretold, it was a lone wild sample.
+        A wild one, which is not where the rates take it, waits for the next: where that goes on from before, it was
+        alone.
         """
-        surprise = math.remainder(self._error - foretold, 100.0) if math.isfinite(foretold) else math.inf
         wild, self._wild = self._wild, None
-        if self._is_held or abs(surprise) > max(SURPRISE, WILD * self._stray):
-            if wild is None and not self._is_held and math.isfinite(surprise):
-                self._wild, self._smooth = self._error, math.remainder(foretold, 100.0)
-                return
+        if is_wild and wild is None:
+            self._wild, self._smooth = self._error, math.remainder(foretold, 100.0)
+            return
+        surprise = math.remainder(self._error - foretold, 100.0) if math.isfinite(foretold) else math.inf
+        stray, limit = surprise * SMOOTHING / (dt + SMOOTHING), self._stray
+        if self._is_held or is_wild or abs(surprise) > self._surprise:
             stray = 0.0
-        else:
-            self._strays += wild is not None
-            limit, wild = self._stray, None
-            stray = min(max(surprise * SMOOTHING / (dt + SMOOTHING), -limit), limit)
-        self._smooth = smooth = math.remainder(self._error - stray, 100.0)
+        self._smooth = smooth = math.remainder(self._error - min(max(stray, -limit), limit), 100.0)
         self._take_swing(self._error)
         self._since = in_step_from(self._since, self._steps, smooth, smooth, edge)
-        if wild is not None:
+        if is_wild and wild is not None:
             self._take_swing(wild)
             self._since = in_step_from(self._since, self._steps, wild, wild, edge)
+        elif wild is not None:
+            self._strays += 1
 
     def _stalled(self, stamp_ns: int) -> tuple[str, ...]:
         if self._is_held:
