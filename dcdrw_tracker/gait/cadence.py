@@ -5,8 +5,10 @@ from itertools import accumulate, pairwise
 from statistics import median_low
 from typing import NamedTuple
 
-LEARNING_COUNTS = (2, 5, 15, 60)
+LEARNING_COUNTS = (2, 5, 15, 60, 240)
 """Numbers of intervals after which the period is learned; after the last, it is learned anew."""
+SURE = 60
+"""So many intervals that are alike tell a source that sends one by one from the inside of a burst."""
 GAP = 1.5
 """An interval longer than this many periods is a gap."""
 TOGETHER = 0.25
@@ -38,6 +40,8 @@ class _Beat(NamedTuple):
     """The longest interval within a burst."""
     fixed: bool = False
     """All bursts are of one size, so that one with fewer samples has lost some."""
+    alone: bool = False
+    """The source surely sends one by one."""
     apart_ns: float = 0.0
     """The longest time from burst to burst, where they are of various sizes."""
 
@@ -80,7 +84,7 @@ class Cadence:
         intervals = self._intervals
         intervals.append(interval)
         if len(intervals) in self._counts:
-            self._beat = beat = _learned(intervals, self._beat, self._counts == LEARNING_COUNTS[-1:])
+            self._beat = beat = _learned(intervals, self._beat)
             self.period_ns, self.burst = round(beat.sample_ns), round(beat.size)
             if len(intervals) == LEARNING_COUNTS[-1]:
                 self._settle()
@@ -154,7 +158,7 @@ class Cadence:
         return gaps, lost, longest_ns, intervals[first:], before
 
 
-def _learned(intervals: list[int], known: _Beat | None, is_sure: bool) -> _Beat:
+def _learned(intervals: list[int], known: _Beat | None) -> _Beat:
     """The beat of these intervals; that which was known where they come in bursts that tell none.
 
     A source that surely sent one by one, as far apart as samples still are, sends no bursts: it loses samples.
@@ -165,9 +169,9 @@ def _learned(intervals: list[int], known: _Beat | None, is_sure: bool) -> _Beat:
     ratios = [later / earlier for earlier, later in pairwise(ordered)]
     widest = max(range(len(ratios)), key=ratios.__getitem__, default=0)
     if not ratios or ratios[widest] * TOGETHER < 1.0:
-        return one_by_one
+        return one_by_one._replace(alone=len(intervals) >= SURE)
     together = ordered[widest]
-    if known and is_sure and known.size == 1.0 and together > 0.5 * known.period_ns:
+    if known and known.alone and together > 0.5 * known.period_ns:
         return known
     ends = [place for place, interval in enumerate(intervals) if interval > together]
     sums = list(accumulate(intervals, initial=0))

@@ -122,3 +122,12 @@ def test_what_is_lost_between_bursts_of_random_sizes_is_counted() -> None:
     stamps = flushed(3000, 6, 1)
     status = tick([stamp for stamp in stamps if not 5000.0 < stamp < 6000.0]).status()
     assert 180 < status.lost < 220
+
+
+@pytest.mark.parametrize('size', [16, 30, 50])
+@pytest.mark.parametrize('lost', [0, 10])
+def test_long_bursts_are_told_from_losses(size: int, lost: int) -> None:
+    stamps = bursts(100 * size, size, 5.0 * size)
+    kept = [stamp for place, stamp in enumerate(stamps) if not lost or place // size % lost != 7]
+    status = tick(kept).status()
+    assert status.lost == len(stamps) - len(kept)
