@@ -334,7 +334,8 @@ class SyncMonitor:
         foretold = by_rates = self._smooth + 50.0 * (last.phi.rate + phase.phi.rate) / self._pitch * dt
         is_wild = math.isfinite(by_rates) and abs(math.remainder(error - by_rates, 100.0)) > self._surprise
         if front or rear:
-            believed = edge if is_blind or not is_wild else math.inf
+            # A wild sample tells no strike: neither on the way there nor on the way back.
+            believed = math.inf if (is_wild or self._wild is not None) and not is_blind else edge
             crossed = self._cross(last, phase, front, rear, dt, believed, is_blind)
             foretold = by_rates if is_wild else crossed
         is_smooth = not (front or rear or is_gap) and dt <= SMOOTHING
