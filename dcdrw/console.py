@@ -25,6 +25,8 @@ MENDS = {
 }
 """Modules that only some commands need, and what brings each."""
 STDOUT = Path('-')
+LONGEST_LINE = 1000
+"""Signs of an error that are told."""
 Line = TypeVar('Line', bound='LiveLine')
 
 
@@ -133,7 +135,14 @@ def _json_file(text: str) -> Path:
 
 
 def in_words(error: ValueError | OSError) -> str:
-    """An error without the system's numbers."""
+    """An error in one line without the system's numbers; of one that quotes half a file, the beginning and the end."""
+    from dcdrw_msgs_py.text_file import one_line  # only where something went wrong
+
+    text = one_line(_words(error))
+    return text if len(text) <= LONGEST_LINE else f'{text[: LONGEST_LINE // 2]} … {text[-LONGEST_LINE // 2 :]}'
+
+
+def _words(error: ValueError | OSError) -> str:
     if not isinstance(error, OSError) or not error.strerror:
         return str(error)
     reason = 'there is no such file or folder' if error.errno == errno.ENOENT else error.strerror.lower()

@@ -66,7 +66,7 @@ class _Loader(_Scalars, getattr(yaml, 'CSafeLoader', yaml.SafeLoader)):  # type:
     def construct_mapping(self, node: Any, deep: bool = False) -> Any:
         """Take names as text, `y` too; refuse one that stands twice: which of the two is meant nobody knows."""
         seen = set()
-        for key, _ in node.value:
+        for key, _ in node.value if isinstance(node, yaml.MappingNode) else ():  # else its tag lies, which is refused
             if isinstance(key, yaml.ScalarNode):
                 if key.value in seen:
                     raise ValueError(f'line {key.start_mark.line + 1} has {key.value} for the second time')
@@ -82,15 +82,23 @@ class _Dumper(_Scalars, getattr(yaml, 'CSafeDumper', yaml.SafeDumper)):  # type:
 
 
 def _number(loader: Any, node: Any) -> int | float:
-    found = number(node.value)
+    found = number(loader.construct_scalar(node))
     if found is None:
         raise yaml.constructor.ConstructorError(None, None, f'{node.value!r} is not a number', node.start_mark)
     return found
 
 
+def _truth(loader: Any, node: Any) -> bool:
+    word = loader.construct_scalar(node)
+    if word not in _TRUE | _FALSE:
+        raise yaml.constructor.ConstructorError(None, None, f'{word!r} is not true or false', node.start_mark)
+    return word in _TRUE
+
+
 _Loader.add_constructor(f'{_TAG}int', _number)
 _Loader.add_constructor(f'{_TAG}float', _number)
-_Loader.add_constructor(f'{_TAG}bool', lambda _, node: node.value in _TRUE)
+_Loader.add_constructor(f'{_TAG}bool', _truth)
+_Loader.add_constructor(f'{_TAG}timestamp', _Loader.construct_yaml_str)  # as a plain one
 _Loader.add_constructor(f'{_TAG}opencv-matrix', lambda loader, node: loader.construct_mapping(node, deep=True))
 _Dumper.add_representer(float, lambda dumper, value: dumper.represent_scalar(f'{_TAG}float', _written(value)))
 

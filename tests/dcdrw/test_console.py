@@ -11,7 +11,7 @@ import termios
 
 import pytest
 
-from dcdrw.console import add_json, degrees, interruptible, need, phase_percent, tell
+from dcdrw.console import LONGEST_LINE, add_json, degrees, in_words, interruptible, need, phase_percent, tell
 from dcdrw.files import add_force
 from tests import ROOT
 
@@ -100,6 +100,14 @@ def test_what_is_missing_is_told_with_its_mend(monkeypatch):
     monkeypatch.setitem(sys.modules, 'aiohttp', None)
     with pytest.raises(ValueError, match='the live page needs aiohttp: pip install aiohttp'):
         need('the live page', 'argparse', 'aiohttp')
+
+
+def test_an_error_is_one_line_that_commands_no_terminal_whatever_it_quotes():
+    assert in_words(ValueError('a\nb\x1b[31m is no key (x.yaml)')) == 'a\\nb\\x1b[31m is no key (x.yaml)'
+    told = in_words(ValueError(f'k must be a number, got {[1] * 10_000} (x.yaml)'))
+    assert len(told) < LONGEST_LINE + 10
+    assert told.startswith('k must be a number')
+    assert told.endswith('(x.yaml)')
 
 
 def test_a_phase_below_one_percent_is_asked_about():

@@ -67,6 +67,11 @@ def test_what_pyyaml_would_write_plainly_is_quoted_where_a_node_would_take_it_fo
         (b'a:\n  b:\n\tc: 1', r'is not YAML: .*\(a tab indents a line: use blanks\)'),
         (b'\xff\xfe\xff', 'is not UTF-8 text'),
         (b'a: !!python/object/apply:os.system [ls]', 'is not YAML: could not determine a constructor'),
+        (b'K: !!opencv-matrix [1, 2]', 'is not YAML: expected a mapping node, but found sequence'),
+        (b'K: !!opencv-matrix 3', 'is not YAML: expected a mapping node, but found scalar'),
+        (b'a: !!bool maybe', "is not YAML: 'maybe' is not true or false"),
+        (b'a: !!bool [true]', 'is not YAML: expected a scalar node'),
+        (b'a: !!int [1]', 'is not YAML: expected a scalar node'),
         (b'a: &x [1]\nb: *x', r'is not YAML: line 2 has the alias \*x: write its value there'),
         (b'[' * 100_000, 'is not YAML'),
         (b'- ' * (DEEPEST + 1) + b'a', f'nested more than {DEEPEST} levels deep'),
@@ -80,6 +85,12 @@ def test_what_is_no_yaml_is_refused_in_one_line(data, message, tmp_path):
         read_yaml(path)
     assert str(path) in str(error.value)
     assert '\n' not in str(error.value)
+
+
+def test_a_time_is_text_also_where_a_tag_calls_it_one(tmp_path):
+    path = tmp_path / 'camera.yaml'
+    path.write_text('a: !!timestamp 2026-11-25\nb: 2026-11-25\n')
+    assert read_yaml(path) == {'a': '2026-11-25', 'b': '2026-11-25'}
 
 
 def test_a_file_by_opencv_is_read(tmp_path):
