@@ -310,10 +310,10 @@ class LiveState:
         if said is None or state is None or state is PairState.NO_DATA:
             said = diagnose_sync(status, 0.0, STALE_SECONDS)
             state = judge(status)
-        if state is PairState.CONVERGING:  # the figures beside it are younger than the node's words
+        if state is PairState.CONVERGING:
             band, hold = self._params.sync.band_percent, self._params.sync.hold_steps
             return state.value, f'until the error stays within ±{band:g} % for {counted(hold, "step")}'
-        return state.value, 'the error has left the band' if state is PairState.LOST else said.message
+        return state.value, said.message
 
     def _why_no_data(self, age: float, now: float) -> str:
         if now - self._joints_at <= STALE_SECONDS:

@@ -129,9 +129,10 @@ def _message(state: PairState, status: SyncStatus, age: float) -> str:
         PairState.HELD: 'the wheels are held',
         PairState.STALLED: f'stalled: the {" and the ".join(status.stalled)} wheel does not strike any more',
         PairState.SLIPPED: f'slipped a step: n = {status.step_difference}',
-        PairState.LOST: f'lost synchronization: error {status.error_percent:+.1f} %',
+        # No error here: it changes within a step, and stands elsewhere, younger.
+        PairState.LOST: 'lost synchronization: the error has left the band',
         PairState.SYNCHRONIZED: f'synchronized after {counted(status.steps_text, "step")}',
-        PairState.CONVERGING: f'converging: error {status.error_percent:+.1f} %',
+        PairState.CONVERGING: 'converging: the error does not stay in the band yet',
     }[state]
 
 

@@ -52,12 +52,12 @@ def test_a_person_reads_what_is_wrong() -> None:
         (STATUS._replace(synchronized=True), 2.5, 'stale: no sample for 2.5 s'),
         (STATUS._replace(stalled=('front', 'rear')), 0.0, 'stalled: the front and the rear wheel'),
         (STATUS._replace(slipped=True, step_difference=2), 0.0, 'slipped a step: n = 2'),
-        (STATUS._replace(lost=True), 0.0, 'lost synchronization: error -2.0 %'),
+        (STATUS._replace(lost=True), 0.0, 'lost synchronization: the error has left the band'),
         (STATUS._replace(synchronized=True, steps_to_synchronization=7), 0.0, 'synchronized after 7 steps'),
         (
             STATUS._replace(too_coarse=True, resolution_percent=37.5),
             0.0,
-            'converging: error -2.0 %; the encoders are too',
+            'converging: the error does not stay in the band yet; the encoders are too',
         ),
     ):
         assert diagnose_sync(status, age, 1.0).message.startswith(message)
