@@ -1,15 +1,12 @@
 """Parts lists of springs and dashpots as people have them: any separator, decimal sign, case and unit."""
 
-import csv
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator
-from io import StringIO
 from pathlib import Path
 from typing import NamedTuple
 
-from dcdrw_msgs_py.text_file import read_text
+from dcdrw_msgs_py.text_file import csv_rows, one_line, read_text
 from dcdrw_sim.study.parts import DASHPOT, SPRING, Part
 
 MOST_PAIRS = 20_000
@@ -40,12 +37,15 @@ FIRST_LINES = 20
 MORE = {'max_force': 'N', 'max_stroke': 'm', 'max_speed': 'm/s', 'free_length': 'm'}
 """Other columns of numbers, with the units that they have where none stands there."""
 VALUES = {SPRING: 'N/m', DASHPOT: 'N·s/m'}
+LONGEST = 10.0
+"""No part is longer [m]: a larger number without a unit is of another."""
 _POUND = 4.4482216152605
 _WEIGHT = 9.80665
 _FORCE = {'mass': 1, 'length': 1, 'time': -2}
 _UNITS = {
     **dict.fromkeys(('N', 'Newton', 'newton'), (1.0, _FORCE)),
     'kN': (1e3, _FORCE),
+    'daN': (10.0, _FORCE),
     'mN': (1e-3, _FORCE),
     'kgf': (_WEIGHT, _FORCE),
     'gf': (1e-3 * _WEIGHT, _FORCE),
@@ -54,7 +54,8 @@ _UNITS = {
     'm': (1.0, {'length': 1}),
     'cm': (1e-2, {'length': 1}),
     'mm': (1e-3, {'length': 1}),
-    'in': (0.0254, {'length': 1}),
+    **dict.fromkeys(('in', 'inch'), (0.0254, {'length': 1})),
+    'ft': (0.3048, {'length': 1}),
     **dict.fromkeys(('s', 'sec'), (1.0, {'time': 1})),
 }
 """Sizes in SI, and powers of what."""
@@ -105,7 +106,7 @@ def read_parts(path: Path) -> PartsList:
     lines = text.splitlines(keepends=True)
     first, separator = _heading(path, lines)
     parts: dict[Part, int] = {}
-    rows = _rows(path, ''.join(lines[first:]), separator)
+    rows = csv_rows(path, ''.join(lines[first:]), separator)
     _, names = next(rows)
     columns = [_column(name) for name in names]
     skipped = [
@@ -119,9 +120,13 @@ def read_parts(path: Path) -> PartsList:
     decimal_comma = separator != ',' and re.search(r'\d,\d{1,2}(?!\d)|\d,\d{4}', text) is not None
     for number, row in rows:
         line = first + number
+        if not parts and _are_units(row):
+            raise ValueError(f'{path}, line {line}: units belong into the heading, as value [{VALUES[SPRING]}]')
         filled = row + [''] * len(columns)
         cells = {name: (cell, unit) for (name, unit), cell in zip(columns, filled, strict=False)}
         try:
+            if any(cell.strip() for cell in row[len(columns) :]):
+                raise _SkipError(f'more cells than the heading has: is {separator!r} within a number or a name?')
             part = _part(cells, decimal_comma)
             if part in parts:
                 raise _SkipError(f'the same part as in line {parts[part]}')
@@ -148,16 +153,6 @@ def _heading(path: Path, lines: list[str]) -> tuple[int, str]:
     raise ValueError(f'{path} must begin with the heading kind,value,name, got {begins[:80]!r}')
 
 
-def _rows(path: Path, text: str, separator: str) -> Iterator[tuple[int, list[str]]]:
-    reader = csv.reader(StringIO(text, newline=''), delimiter=separator)
-    try:
-        for row in reader:
-            if any(cell.strip() for cell in row):
-                yield reader.line_num, row
-    except csv.Error as error:
-        raise ValueError(f'{path}, line {reader.line_num}: {error}') from None
-
-
 def _column(heading: str) -> tuple[str, str]:
     """What a heading is of, and the unit that stands in it, in brackets or not."""
     words = re.sub(r'[\[(_,]', lambda sign: f' {sign[0].strip("_,")}', heading.strip('"\ufeff \r\n')).split()
@@ -168,13 +163,23 @@ def _column(heading: str) -> tuple[str, str]:
     return '', ''
 
 
+def _are_units(row: list[str]) -> bool:
+    """Whether nothing but units stands in a row."""
+    units = [unit for cell in row if (unit := cell.strip(' []()-'))]
+    try:
+        return bool(units) and all(_measure(unit)[1] for unit in units)
+    except _SkipError:
+        return False
+
+
 def _part(cells: dict[str, tuple[str, str]], decimal_comma: bool) -> Part:
     called = cells['kind'][0].strip().lower()
-    kind = next((kind for word, kind in KINDS.items() if word in called), None)
-    if kind is None:
+    kinds = {kind for word, kind in KINDS.items() if word in called}
+    if len(kinds) != 1:
         raise _SkipError(f'kind must be spring, dashpot or damper, got {cells["kind"][0]!r}')
     if any(word in called for word in OTHERS):
         raise _SkipError(f'a {called} has no stiffness in N/m')
+    (kind,) = kinds
     cell, unit = cells[kind] if cells.get(kind, ('', ''))[0].strip() else cells.get('value', ('', ''))
     unit = cells.get('unit', ('', ''))[0].strip() or unit
     value = _quantity('value', cell, unit, VALUES[kind], decimal_comma)
@@ -183,7 +188,7 @@ def _part(cells: dict[str, tuple[str, str]], decimal_comma: bool) -> Part:
         for name, unit in MORE.items()
         if cells.get(name, ('', ''))[0].strip()
     }
-    return Part(kind, value, cells.get('name', ('', ''))[0].strip(), **more)
+    return Part(kind, value, one_line(cells.get('name', ('', ''))[0].strip()), **more)
 
 
 def _quantity(name: str, cell: str, unit: str, wanted: str, decimal_comma: bool) -> float:
@@ -197,6 +202,8 @@ def _quantity(name: str, cell: str, unit: str, wanted: str, decimal_comma: bool)
     value = _number(number, decimal_comma) * _factor(own or unit or wanted, wanted)
     if not 0.0 < value < math.inf:
         raise _SkipError(f'{name} must be a number > 0, got {cell!r}')
+    if wanted == 'm' and not (own or unit) and value > LONGEST:
+        raise _SkipError(f'{name} would be {value:g} m: write its unit')
     return value
 
 
@@ -206,11 +213,12 @@ def _number(text: str, decimal_comma: bool) -> float:
     if ',' in text and '.' in text:
         thousands, sign = (',', '.') if text.rindex(',') < text.rindex('.') else ('.', ',')
         text = text.replace(thousands, '').replace(sign, '.')
+    elif re.fullmatch(r'[-+]?[1-9]\d{0,2}[.,]\d{3}', text) and (',' in text) != decimal_comma:
+        whole, rest = re.split('[.,]', text)
+        point = ',' if decimal_comma else '.'
+        raise _SkipError(f'{text} may be {whole}{point}{rest} or {whole}{rest}: write one of them')
     elif text.count(',') == 1:
-        whole, _, rest = text.partition(',')
-        if re.fullmatch(r'[-+]?[1-9]\d{0,2}', whole) and re.fullmatch(r'\d{3}', rest) and not decimal_comma:
-            raise _SkipError(f'{text} may be {whole}.{rest} or {whole}{rest}: write one of them')
-        text = f'{whole}.{rest}'
+        text = text.replace(',', '.')
     else:
         text = text.replace(',', '')
     try:

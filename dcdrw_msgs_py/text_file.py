@@ -48,18 +48,30 @@ def read_text(path: Path, largest: int = LARGEST_TEXT, windows: bool = False) ->
         raise ValueError(f'{path}, line {line}: byte 0x{data[error.start]:02x} is not UTF-8 text') from None
 
 
-def read_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """The rows of a CSV file that are not empty, each with the number of its last line.
+def csv_rows(path: Path, text: str, separator: str = ',') -> Iterator[tuple[int, list[str]]]:
+    """The rows of a table that hold something and are no remark (#), each with the number of its last line.
 
     Raises:
-        ValueError: not CSV in UTF-8; names the file and the line.
+        ValueError: not CSV; names the file, `path`, and the line.
+
+    """
+    reader, begins = csv.reader(StringIO(text, newline=''), delimiter=separator, strict=True), 1
+    try:
+        for row in reader:
+            if any(cell.strip() for cell in row) and not row[0].lstrip().startswith('#'):
+                yield reader.line_num, row
+            begins = reader.line_num + 1
+    except csv.Error as error:
+        what = 'a quotation mark is not closed' if 'end of data' in str(error) else error
+        raise ValueError(f'{path}, line {begins}: {what}') from None
+
+
+def read_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """The rows of a CSV file as `csv_rows` has them.
+
+    Raises:
+        ValueError: not CSV; names the file and the line.
         OSError: the file cannot be read.
 
     """
-    reader = csv.reader(StringIO(read_text(path, LARGEST_TABLE), newline=''))
-    try:
-        for row in reader:
-            if row:
-                yield reader.line_num, row
-    except csv.Error as error:
-        raise ValueError(f'{path}, line {reader.line_num}: {error}') from None
+    yield from csv_rows(path, read_text(path, LARGEST_TABLE))

@@ -37,6 +37,8 @@ SOFT, OIL = Part('spring', 10.0, 'soft'), Part('dashpot', 100.0, 'oil')
         'part,type,stiffness N/mm,damping in N·s/m\nsoft,Tension spring,0.01,\noil,shock absorber,,100\n',
         'kind|value|name\nspring|10 N m^-1|soft\ndamper|0.1 N sec/mm|oil\n',
         'kind,value,name\nspring,~10 ± 1 N/m,soft\ndamper,100 N·s/m (adjusted),oil\n',
+        'kind,value,name\n# spring,7,sold out\nspring,10,soft\ndamper,100,oil\n',
+        'kind,value,name\nspring,0.685217659 lbf/ft,soft\ndamper,10 daN·s/m,oil\n',
         'kind,value,name\nspring,1.01971621 gf/mm,soft\ndamper,0.571014716 lbf·s/in,oil\n',
     ],
 )
@@ -85,6 +87,8 @@ def test_rated_limits_are_read_in_their_units(read):
         ('spring,10-12,x', "line 4: value '10-12' is a range: write what it is set to"),
         ('spring,10,soft', 'line 4: the same part as in line 2'),
         ('gas spring,10,x', 'line 4: a gas spring has no stiffness in N/m'),
+        ('spring,5,25,x', "line 4: more cells than the heading has: is ',' within a number or a name?"),
+        ('spring damper,5,x', "line 4: kind must be spring, dashpot or damper, got 'spring damper'"),
         ('Total,110,', "line 4: kind must be spring, dashpot or damper, got 'Total'"),
     ],
 )
@@ -99,6 +103,18 @@ def test_a_thousand_is_told_from_a_decimal_where_the_list_shows_its_sign(read):
     assert spring.value == pytest.approx(1.25)
     spring, *_ = read('kind,value\nspring,"1,250.5"\ndamper,5\n').parts
     assert spring.value == pytest.approx(1250.5)
+    assert read('kind;value\nspring;1.250\nspring;5,5\ndamper;2\n').skipped == (
+        'line 2: 1.250 may be 1,250 or 1250: write one of them',
+    )
+
+
+def test_a_length_without_unit_that_no_part_has_is_told(read):
+    offer = read('kind,value,stroke\nspring,10,0.45\nspring,12,450\ndamper,9,\n')
+    assert offer.skipped == ('line 3: max_stroke would be 450 m: write its unit',)
+
+
+def test_a_name_commands_no_terminal(read):
+    assert read('kind,value,name\nspring,10,\x1b[31msoft\ndamper,9,\n').parts[0].name == '\\x1b[31msoft'
 
 
 @pytest.mark.parametrize(
@@ -109,6 +125,8 @@ def test_a_thousand_is_told_from_a_decimal_where_the_list_shows_its_sign(read):
         ('kind,value\nspring,5\n', 'has no dashpot that can be used'),
         ('kind,value\nrope,5\n', "has no spring that can be used; line 2: kind must be spring.*got 'rope'"),
         ('kind,value,value\nspring,5,6\ndamper,7,8\n', 'has 2 columns of value: leave one'),
+        ('kind,value,name\n,N/mm,-\nspring,5,\n', r'line 2: units belong into the heading, as value \[N/m\]'),
+        ('kind,value,name\nspring,5,"x\ndamper,5,\n', 'line 2: a quotation mark is not closed'),
         ('PK\x03\x04\x14', 'is a workbook: save its sheet as CSV'),
     ],
 )
