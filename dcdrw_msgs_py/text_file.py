@@ -2,6 +2,7 @@
 
 import csv
 import os
+import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterator
 from io import StringIO
@@ -11,6 +12,7 @@ LARGEST_TEXT = 16 * 2**20
 """A larger text is none of ours [bytes]."""
 LARGEST_TABLE = 256 * 2**20
 """A larger table is none of ours [bytes]."""
+_DECIMAL_COMMA = re.compile(r'(?<=\d),(?=\d)')
 
 
 def one_line(text: object) -> str:
@@ -69,9 +71,17 @@ def csv_rows(path: Path, text: str, separator: str = ',') -> Iterator[tuple[int,
 def read_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
     """The rows of a CSV file as `csv_rows` has them.
 
+    As the first row has them, tabs, semicolons or commas stand between columns; where it is no comma, numbers may have
+    a decimal comma, which is a point in what is returned.
+
     Raises:
         ValueError: not CSV; names the file and the line.
         OSError: the file cannot be read.
 
     """
-    yield from csv_rows(path, read_text(path, LARGEST_TABLE))
+    text = read_text(path, LARGEST_TABLE, windows=True)
+    begins = re.search(r'^[ \t]*[^#\s].*', text, re.MULTILINE)
+    separator = next((sign for sign in '\t;' if begins and sign in begins[0]), ',')
+    has_points = separator == ',' or re.search(r'\d\.\d', text)
+    for line, row in csv_rows(path, text, separator):
+        yield line, row if has_points else [_DECIMAL_COMMA.sub('.', cell) for cell in row]

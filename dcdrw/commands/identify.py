@@ -48,7 +48,8 @@ MOST_GAINS = 3
 """Measurements that are told."""
 _EPILOG = """\
 A recording is as for dcdrw analyze, or the folder of dcdrw track, or a CSV file of encoders: columns time [s], psi1 and
-psi2 [rad] (or psi1_deg, psi2_deg), both zero where a spoke stands along the slope's normal.
+psi2 [rad] (or psi1_deg, psi2_deg), both zero where a spoke stands along the slope's normal. Other units stand in
+brackets behind a name: time [ms].
 
 The rig file says what is known: its values are where the search begins, and how far each is trusted stands in its
 section on uncertainty (docs/identify.md), or is assumed. The spring's rate is as the file says: free wheels tell

@@ -13,8 +13,9 @@ _EPILOG = """\
 FILE is a recording with the topics that leg_tracker takes, or a .csv whose columns are named: time [s] or stamp_ns,
 then of each leg left_acc_x … left_gyr_z, left_contact (0 or 1), left_force [N] or left_hip [rad], with front_ or
 rear_ before it where there are two halves, and without the side where there is one leg. Two heading rows (sensor,
-axis) do, too; two columns without a heading are the time and one foot's force. Angular rates beyond 35 are taken to
-be in deg/s, for no leg turns so fast in rad/s.
+axis) do, too; two columns without a heading are the time and one foot's force. Other units stand in brackets behind a
+name: time [ms], left_hip [deg]. Angular rates beyond 35 whose unit is not named are taken to be in deg/s, for no leg
+turns so fast in rad/s.
 
 DIR gets summary.json, and
   heel_strikes.csv  each heel strike: leg, stamp_ns, and the stamp known_ns of the reading that made it certain

@@ -69,12 +69,13 @@ def _summarize(walk: Walk, leg: Leg) -> dict[str, Any]:
 
 def is_complete(summary: dict[str, dict[str, Any]]) -> bool:
     """Whether the heel strikes of every leg could be told."""
-    return all(one['mounting_known'] and one['strikes'] for one in summary.values())
+    return bool(summary) and all(one['mounting_known'] and one['strikes'] for one in summary.values())
 
 
 def sentences(summary: dict[str, dict[str, Any]]) -> list[str]:
     """A line for each leg."""
-    return [f'{leg} ({one["sensor"]}): {_told(one)}' for leg, one in summary.items()]
+    lines = [f'{leg} ({one["sensor"]}): {_told(one)}' for leg, one in summary.items()]
+    return lines or ['no sensor on a leg tells anything']
 
 
 def _told(one: dict[str, Any]) -> str:

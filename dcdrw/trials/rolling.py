@@ -1,16 +1,18 @@
 """The part of a recorded trial in which both wheels roll by themselves, as samples to identify a rig from."""
 
 import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from dcdrw.trials.analysis import Analysis
 from dcdrw.trials.motion import MotionTable
+from dcdrw_msgs_py.columns import check_pace, heading, number, size
 from dcdrw_msgs_py.rig import RigParams
-from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.text_file import read_rows
 from dcdrw_sim.identification.samples import Samples, free_rolling
+from dcdrw_tracker.gait.phase import PhaseParams
 
 
 def rolling_samples(
@@ -38,15 +40,17 @@ def rolling_samples(
     return free_rolling(rig, seconds[chosen], np.column_stack([motion.rotation1, motion.rotation2])[chosen])
 
 
-UNITS = {'': 1.0, '_deg': math.radians(1.0)}
-"""Endings of a column's name, with sizes in rad."""
+TIMES = {'time': 's', 'stamp_ns': 'ns'}
+TURNS = {'': 'rad', '_deg': 'deg'}
+"""Columns of time, and endings of those of a wheel, with their units where the heading names none."""
 
 
 def table_samples(path: Path, rig: RigParams, begin: float = 0.0, end: float = math.inf) -> Samples:
     """The same of a table of encoders: columns `time` [s] or `stamp_ns`, psi1 and psi2 [rad], or psi1_deg and psi2_deg.
 
     Args:
-        path: of a CSV file; other columns are left alone, and empty cells are gaps.
+        path: of a CSV file; other columns are left alone, empty cells are gaps, and a unit in brackets behind a
+            column's name counts.
         rig: whose wheels they are.
         begin: time from the first sample on [s].
         end: likewise.
@@ -57,36 +61,59 @@ def table_samples(path: Path, rig: RigParams, begin: float = 0.0, end: float = m
 
     """
     rows = read_rows(path)
-    _, heading = next(rows, (0, []))
-    names = [name.strip().lower() for name in heading]
-    times = [(names.index(name), size) for name, size in (('time', 1.0), ('stamp_ns', 1.0 / SECOND)) if name in names]
-    wheels = [
-        [(names.index(wheel + ending), size) for ending, size in UNITS.items() if wheel + ending in names]
-        for wheel in ('psi1', 'psi2')
+    _, first = next(rows, (0, []))
+    headings = [heading(text) for text in first]
+    columns = [
+        _column(path, headings, TIMES, 's'),
+        *(
+            _column(path, headings, {wheel + ending: unit for ending, unit in TURNS.items()}, 'rad')
+            for wheel in ('psi1', 'psi2')
+        ),
     ]
-    for name in ('time', 'psi1', 'psi2'):
-        if names.count(name) > 1:
-            raise ValueError(f'{path} has the column {name} {names.count(name)} times')
-    if not times or not all(wheels):
-        raise ValueError(f'{path} must have columns time, psi1, psi2 (or stamp_ns, psi1_deg, psi2_deg), got {names}')
-    columns = (times[0], *(found[0] for found in wheels))
-    table = np.array([[_number(path, line, row, place) for place, _ in columns] for line, row in rows])
-    if not len(table):
+    table: list[list[float]] = []
+    last = -math.inf
+    for line, row in rows:
+        try:
+            table.append([number(row[place] if place < len(row) else '') * size for place, size in columns])
+        except ValueError as error:
+            raise ValueError(f'{path}, line {line}: {error}') from None
+        if not table[-1][0] > last:
+            raise ValueError(f'{path}, line {line}: time must go on from row to row')
+        last = table[-1][0]
+    if not table:
         raise ValueError(f'{path} has no samples')
-    seconds, *psi = (table * [size for _, size in columns]).T
+    seconds, *psi = np.array(table).T
+    check_pace(path, seconds)
     seconds = seconds - seconds[0]
-    if not (np.diff(seconds) > 0.0).all():
-        raise ValueError(f'{path}, line {int(np.argmin(np.diff(seconds) > 0.0)) + 3}: time must go on from row to row')
+    rotations = np.column_stack(psi)
+    speeds = np.abs(np.diff(rotations, axis=0)) / np.diff(seconds)[:, None]
+    speeds = speeds[np.isfinite(speeds)]
+    if speeds.size and float(np.median(speeds)) > PhaseParams().max_speed:
+        raise ValueError(
+            f'{path}: no wheel rolls at {np.median(speeds):.3g} rad/s: are psi1 and psi2 in degrees? Then name them '
+            'psi1_deg and psi2_deg'
+        )
     chosen = (seconds >= begin) & (seconds <= end)
-    return free_rolling(rig, seconds[chosen], np.column_stack(psi)[chosen])
-
-
-def _number(path: Path, line: int, row: list[str], place: int) -> float:
-    cell = row[place].strip() if place < len(row) else ''
     try:
-        number = float(cell or 'nan')
-    except ValueError:
-        number = math.inf
-    if math.isinf(number) or '_' in cell:
-        raise ValueError(f'{path}, line {line}: {cell!r} is not a number')
-    return number
+        return free_rolling(rig, seconds[chosen], rotations[chosen])
+    except ValueError as error:
+        raise ValueError(f'{path}: {error}') from None
+
+
+def _column(
+    path: Path, headings: Sequence[tuple[str, str]], names: Mapping[str, str], wanted: str
+) -> tuple[int, float]:
+    """Where the one column of several names is, and the size of its unit."""
+    found = [(place, name, unit) for place, (name, unit) in enumerate(headings) if name in names]
+    if not found:
+        raise ValueError(
+            f'{path} must have columns time, psi1, psi2 (or stamp_ns, psi1_deg, psi2_deg), got '
+            f'{[name for name, _ in headings]}'
+        )
+    if len(found) > 1:
+        raise ValueError(f'{path} has the columns {" and ".join(name for _, name, _ in found)}: leave one')
+    ((place, name, unit),) = found
+    try:
+        return place, size(unit or names[name], wanted)
+    except ValueError as error:
+        raise ValueError(f'{path}, column {name}: {error}') from None

@@ -3,7 +3,7 @@
 import math
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
@@ -19,6 +19,7 @@ from dcdrw_control.legs.samples import (
     Reading,
     WrenchReading,
 )
+from dcdrw_msgs_py.columns import check_pace, heading, number, size
 from dcdrw_msgs_py.rig import FRONT
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.text_file import read_rows
@@ -29,11 +30,12 @@ from dcdrw_msgs_py.words import counted
 FASTEST = 35.0
 """No leg turns faster [rad/s], and gyroscopes end at 2000 degrees per second: a file with larger rates is in deg/s."""
 _COLUMN = re.compile(r'(?:(front|rear)_)?(?:(left|right)_)?(acc_[xyz]|gyr_[xyz]|contact|force|hip|hip_rate)')
-_UNIT = re.compile(r'\s*[\[(].*')
-"""What stands behind a column's name: its unit."""
+_UNITS = {'acc': 'm/s²', 'gyr': 'rad/s', 'force': 'N', 'hip': 'rad', 'hip_rate': 'rad/s'}
+"""Of quantities, where the heading names none."""
 LATEST = 9e9
 """A later time is none that a stamp can tell [s]."""
-_TIMES = {'time': 1.0, 'time_s': 1.0, 'stamp_ns': 1.0 / SECOND}
+_TIMES = {'time': 's', 'time_s': 's', 'stamp_ns': 'ns'}
+"""Units, where the heading names none."""
 
 
 class LegTable(NamedTuple):
@@ -44,7 +46,7 @@ class LegTable(NamedTuple):
     rate: float
     """Samples per second [Hz]."""
     degrees: bool
-    """Whether its angular rates are taken to be in degrees per second."""
+    """Whether its angular rates, whose unit it does not name, are taken to be in degrees per second."""
 
 
 def read_legs(path: Path, rate: float = math.nan) -> LegTable:
@@ -53,8 +55,8 @@ def read_legs(path: Path, rate: float = math.nan) -> LegTable:
     The columns are named, in one row or in two (sensor, axis): a first column `time` [s], `stamp_ns` or the sample's
     number, then for each leg `left_acc_x`, …, `left_gyr_z`, `left_contact` (0 or 1), `left_force` [N], `left_hip`
     [rad] or `left_hip_rate` [rad/s], with `front_` or `rear_` before it where there are two halves, and without the
-    side where there is one leg. Columns of other names are passed over. A file of two columns without names is the
-    time [s] and the left foot's vertical force [N].
+    side where there is one leg. A unit in brackets behind a name counts. Columns of other names are passed over. A file
+    of two columns without names is the time [s] and the left foot's vertical force [N].
 
     Args:
         path: the file.
@@ -65,44 +67,56 @@ def read_legs(path: Path, rate: float = math.nan) -> LegTable:
         OSError: the file cannot be read.
 
     """
-    names, table = _read(path)
-    seconds = _seconds(path, names[0], table[:, 0], rate)
+    headings, table = _read(path)
+    names = [name for name, _ in headings]
+    seconds = _seconds(path, *headings[0], table[:, 0], rate)
     stamps = np.round(seconds * SECOND).astype(np.int64).tolist()
     columns: dict[Leg, dict[str, Floats]] = defaultdict(dict)
-    for name, column in zip(names, table.T, strict=True):
+    turning: list[Floats] = []
+    for (name, unit), column in zip(headings, table.T, strict=True):
         found = _COLUMN.fullmatch(name)
-        if found:
-            columns[Leg(found[1] or FRONT, found[2] or SIDES[0])][found[3]] = column
-    rates = [column for quantities in columns.values() for name, column in quantities.items() if name[:3] == 'gyr']
-    degrees = bool(rates) and float(np.nanmax(np.abs(rates))) > FASTEST
+        if not found:
+            continue
+        if np.isnan(column).all():
+            raise ValueError(f'{path}: the column {name} has no number: leave it out')
+        columns[Leg(found[1] or FRONT, found[2] or SIDES[0])][found[3]] = column
+        if unit and (wanted := _UNITS.get(re.sub('_[xyz]$', '', found[3]))):
+            column *= _size(path, name, unit, wanted)
+        elif found[3][:3] == 'gyr':
+            turning.append(column)
+    degrees = any((np.abs(column) > FASTEST).any() for column in turning)
+    for column in turning if degrees else ():
+        column *= math.radians(1.0)
     parts = [
-        [LegReading(stamp, leg, reading) for stamp, reading in zip(stamps, made, strict=True)]
+        [LegReading(stamp, leg, reading) for stamp, reading in zip(stamps, made, strict=True) if reading]
         for leg, quantities in columns.items()
-        for made in _readings(path, leg, quantities, math.radians(1.0) if degrees else 1.0)
+        for made in _readings(path, leg, quantities)
     ]
     if not parts:
         raise ValueError(
             f'{path} has no column of a leg, as left_gyr_x, left_force or left_contact: {", ".join(names)}'
         )
+    if math.isnan(rate):
+        check_pace(path, seconds)
     readings = sorted(chain.from_iterable(parts), key=lambda reading: reading.stamp_ns)
     return LegTable(readings, (len(seconds) - 1) / float(seconds[-1] - seconds[0]), degrees)
 
 
-def _read(path: Path) -> tuple[list[str], Floats]:
+def _read(path: Path) -> tuple[list[tuple[str, str]], Floats]:
+    """Names of columns with units, and numbers."""
     lines = list(read_rows(path))
     rows = [row for _, row in lines]
-    if rows and len(rows[0]) == 1 and set(';\t') & set(rows[0][0]):
-        raise ValueError(f'{path}: its columns should have commas between them')
     heads = [row for row in rows[:2] if not any(map(_is_number, row))]
     if len(heads) == 2:
-        names = [f'{sensor.removesuffix("_sensor")}_{axis}' for sensor, axis in zip(*heads, strict=False)]
-        names[0] = 'sample'
+        headings = [(f'{sensor.removesuffix("_sensor")}_{axis}', '') for sensor, axis in zip(*heads, strict=False)]
+        headings[0] = 'sample', ''
     elif heads:
-        names = [_UNIT.sub('', name).strip().lower() for name in heads[0]]
+        headings = [heading(text) for text in heads[0]]
     elif rows and len(rows[0]) == 2:
-        names = ['time', 'left_force']
+        headings = [('time', ''), ('left_force', '')]
     else:
         raise ValueError(f'{path} names no columns: its first row should be time,left_gyr_x,…')
+    names = [name for name, _ in headings]
     twice = next((name for place, name in enumerate(names) if name in names[:place]), None)
     if twice is not None:
         raise ValueError(f'{path} has two columns {twice}')
@@ -110,20 +124,27 @@ def _read(path: Path) -> tuple[list[str], Floats]:
     for line, row in lines[len(heads) :]:
         if len(row) != len(names):
             raise ValueError(f'{path}, line {line}: {counted(len(row), "cell")}, not {len(names)} as in the first row')
-        wrong = next((cell for cell in row if cell and not _is_number(cell)), None)
-        if wrong is not None:
-            raise ValueError(f'{path}, line {line}: {wrong!r} is not a number')
-        table.append([float(cell) if cell else math.nan for cell in row])
+        try:
+            table.append([number(cell) for cell in row])
+        except ValueError as error:
+            raise ValueError(f'{path}, line {line}: {error}') from None
     if len(table) < 2:
         raise ValueError(f'{path}: every row should have {len(names)} numbers, and there should be some')
-    return names, np.array(table)
+    return headings, np.array(table)
 
 
-def _seconds(path: Path, name: str, first: Floats, rate: float) -> Floats:
+def _size(path: Path, name: str, unit: str, wanted: str) -> float:
+    try:
+        return size(unit, wanted)
+    except ValueError as error:
+        raise ValueError(f'{path}, column {name}: {error}') from None
+
+
+def _seconds(path: Path, name: str, unit: str, first: Floats, rate: float) -> Floats:
     if not math.isnan(rate):
         seconds = np.arange(len(first)) / rate
     elif name in _TIMES:
-        seconds = first * _TIMES[name]
+        seconds = first * _size(path, name, unit or _TIMES[name], 's')
     else:
         raise ValueError(f'{path} has no column time or stamp_ns: tell how many samples a second it has (--rate)')
     if not (np.abs(seconds) < LATEST).all():
@@ -133,8 +154,8 @@ def _seconds(path: Path, name: str, first: Floats, rate: float) -> Floats:
     return seconds
 
 
-def _readings(path: Path, leg: Leg, quantities: dict[str, Floats], unit: float) -> Iterator[list[Reading]]:
-    """The readings of each sensor of a leg."""
+def _readings(path: Path, leg: Leg, quantities: dict[str, Floats]) -> Iterator[Sequence[Reading | None]]:
+    """The readings of each sensor of a leg; None where a contact is unknown."""
     if any(name[:3] in ('gyr', 'acc') for name in quantities):
         missing = [name for kind in ('gyr', 'acc') for name in (f'{kind}_{axis}' for axis in 'xyz')]
         missing = [name for name in missing if name not in quantities]
@@ -143,9 +164,10 @@ def _readings(path: Path, leg: Leg, quantities: dict[str, Floats], unit: float) 
         turning, pulling = (
             np.stack([quantities[f'{kind}_{axis}'] for axis in 'xyz'], axis=1) for kind in ('gyr', 'acc')
         )
-        yield [ImuReading(tuple(r), tuple(a)) for r, a in zip((turning * unit).tolist(), pulling.tolist(), strict=True)]
+        yield [ImuReading(tuple(r), tuple(a)) for r, a in zip(turning.tolist(), pulling.tolist(), strict=True)]
     if 'contact' in quantities:
-        yield [ContactReading(touches) for touches in (quantities['contact'] > 0.5).tolist()]
+        contacts = quantities['contact'].tolist()
+        yield [None if math.isnan(contact) else ContactReading(contact > 0.5) for contact in contacts]
     if 'force' in quantities:
         yield _each(WrenchReading, quantities['force'])
     if 'hip' in quantities:
@@ -160,7 +182,7 @@ def _each(make: Callable[..., Reading], *columns: Floats) -> list[Reading]:
 
 def _is_number(cell: str) -> bool:
     try:
-        float(cell)
+        number(cell)
     except ValueError:
         return False
-    return True
+    return bool(cell.strip())

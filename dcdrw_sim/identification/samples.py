@@ -80,6 +80,8 @@ def free_rolling(rig: RigParams, seconds: Floats, rotations: Floats) -> Samples:
     """
     seen = np.isfinite(rotations).all(axis=1)
     seconds, rotations = _together(seconds[seen], rotations[seen])
+    if len(seconds) < FEWEST:
+        raise _too_few(len(seconds))
     level = median_filter(rotations, (NEIGHBOURS, 1), mode='reflect')
     plausible = _plausible(rotations, level)
     likely = np.where(plausible, rotations, level)
@@ -89,7 +91,7 @@ def free_rolling(rig: RigParams, seconds: Floats, rotations: Floats) -> Samples:
     spokes, thetas = (np.stack(columns, axis=1) for columns in zip(*of_wheels, strict=True))
     calm = np.flatnonzero((plausible[:end] & (np.abs(thetas[:end]) < alphas - AWAY)).all(axis=1))
     if not calm.size or end - calm[0] < FEWEST:
-        raise ValueError(f'both wheels roll in {counted(max(end, 0), "sample")} only: nothing can be told of them')
+        raise _too_few(end)
     first = int(calm[0])
     ahead = spokes[:, 0] - spokes[:, 1] - (spokes[0, 0] - spokes[0, 1])
     behind = thetas[0, 0] / (2.0 * alphas[0]) < thetas[0, 1] / (2.0 * alphas[1])  # p in [0, 1): the front is to strike
@@ -100,6 +102,10 @@ def free_rolling(rig: RigParams, seconds: Floats, rotations: Floats) -> Samples:
         int(ahead[first]) + int(behind),
         float(seconds[first]),
     )
+
+
+def _too_few(count: int) -> ValueError:
+    return ValueError(f'both wheels roll in {counted(count, "sample")} only: nothing can be told of them')
 
 
 def _plausible(rotations: Floats, level: Floats) -> Mask:

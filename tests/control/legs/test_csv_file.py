@@ -63,9 +63,16 @@ def test_a_file_of_one_leg_names_no_side_and_needs_no_time_where_the_rate_is_giv
         ('time,speed\n0,1\n1,2\n', 'no column of a leg'),
         ('time,left_force\n0,1\n1,two\n', "line 3: 'two' is not a number"),
         ('time,left_force\n0,1\n1\n', 'line 3: 1 cell, not 2 as in the first row'),
-        ('time,left_force\n0,1\ninf,2\n', 'a time in column time is none'),
+        ('time,left_force\n0,1\ninf,2\n', "line 3: 'inf' is not a number"),
+        ('time,left_force\n0,1\n0.1,1_0\n', "line 3: '1_0' is not a number"),
+        ('time,left_force\n0,1\n,2\n', 'a time in column time is none'),
+        ('time,left_force,right_force\n0,1,\n0.1,2,nan\n', 'the column right_force has no number: leave it out'),
+        ('time [min],left_force\n0,1\n1,2\n', "column time: 'min' is not a unit like s"),
+        ('time,left_hip [N]\n0,1\n1,2\n', "column left_hip: 'N' is not a unit like rad"),
+        ('time,left_force\n0,1\n10,2\n20,3\n', r'10 s lie between .* in another unit.*time \[ms\]'),
+        ('stamp_ns,left_force\n0,1\n10,2\n20,3\n', '1e-08 s lie between'),
+        ('time;left_force\n0,00;1.5\n0,01;2\n', "line 2: '0,00' is not a number"),
         ('time,left_force\n0,1\n1e30,2\n', 'a time in column time is none'),
-        ('time;left_force\n0;1\n1;2\n', 'should have commas between them'),
         ('time,left_force,left_force\n0,1,2\n1,2,3\n', 'has two columns left_force'),
         ('time,left_force\n0,1\n0,2\n', 'must grow'),
         ('sample,left_force\n0,1\n1,2\n', '--rate'),
@@ -82,7 +89,47 @@ def test_a_file_that_cannot_be_read_says_why(tmp_path, text, told):
 
 def test_names_are_read_in_any_case_and_with_their_units_and_an_empty_cell_makes_no_row_a_heading(tmp_path):
     path = tmp_path / 'named.csv'
-    path.write_text('Time [s],Left_Force (N),right_force\n0,1,\n1,2,3\n')
+    path.write_text('Time [s],Left_Force (N),right_force\n0,1,\n0.1,2,3\n')
     forces = [(str(reading.leg), reading.reading.force) for reading in read_legs(path).readings]
     assert forces[0] == ('front_left', 1.0)
     assert len(forces) == 4
+
+
+@pytest.mark.parametrize(
+    'text',
+    [
+        'time;left_force\n0,00;700,5\n0,01;690\n',
+        'time\tleft_force\n0.00\t700.5\n0.01\t690\n',
+        '# a walk\ntime [ms],left_force [kN]\n0,0.7005\n\n# and on\n10,0.69\n,\n',
+        '0,00;700,5\n0,01;690\n',
+    ],
+    ids=['semicolons', 'tabs', 'units and remarks', 'no heading'],
+)
+@pytest.mark.parametrize('encoding', ['utf-8', 'utf-16'])
+def test_separators_decimal_commas_units_and_remarks_all_tell_the_same(text, encoding, tmp_path):
+    path = tmp_path / 'force.csv'
+    path.write_bytes(text.encode(encoding))
+    table = read_legs(path)
+    assert [reading.stamp_ns for reading in table.readings] == [0, 10_000_000]
+    assert [reading.reading.force for reading in table.readings] == pytest.approx([700.5, 690.0])
+
+
+def test_readings_are_in_the_units_that_the_heading_names(tmp_path):
+    path = tmp_path / 'units.csv'
+    imu = [f'left_acc_{axis} [g]' for axis in 'xyz'] + [f'left_gyr_{axis} [deg/s]' for axis in 'xyz']
+    path.write_text(f'time,{",".join(imu)},right_hip (deg)\n0,0,0,1,10,20,-30,90\n0.1,0,0,1,10,20,-30,90\n')
+    table = read_legs(path)
+    readings = {reading.leg: reading.reading for reading in table.readings}
+    assert readings[LEFT].acceleration == pytest.approx((0.0, 0.0, 9.80665))
+    assert readings[LEFT].rate == pytest.approx([math.radians(rate) for rate in (10.0, 20.0, -30.0)])
+    assert readings[RIGHT].angle == pytest.approx(math.pi / 2)
+    assert not table.degrees
+    path.write_text(path.read_text().replace('deg/s', 'rad/s').replace('10,20', '100,20'))
+    assert read_legs(path).readings[0].reading.rate == pytest.approx((100.0, 20.0, -30.0))
+
+
+def test_a_contact_that_is_unknown_is_none(tmp_path):
+    path = tmp_path / 'contact.csv'
+    path.write_text('time,left_contact,right_contact\n0,1,0\n0.1,,0\n0.2,0,\n')
+    contacts = [(reading.leg, reading.reading.touches) for reading in read_legs(path).readings]
+    assert contacts == [(LEFT, True), (RIGHT, False), (RIGHT, False), (LEFT, False)]

@@ -31,6 +31,10 @@ def test_a_leg_that_cannot_be_told_is_no_success(tmp_path, capsys):
     (tmp_path / 'still.csv').write_text('\n'.join([','.join(['time', *axes]), *rows]))
     assert main(['legs', str(tmp_path / 'still.csv')]) == 1
     assert 'its mounting is not known' in capsys.readouterr().out
+    rows = [f'{k / 100},,,,1,2,3' if k % 2 else f'{k / 100},0,0,9.81,,,' for k in range(300)]
+    (tmp_path / 'halves.csv').write_text('\n'.join([','.join(['time', *axes]), *rows]))
+    assert main(['legs', str(tmp_path / 'halves.csv')]) == 1
+    assert 'no sensor on a leg tells anything' in capsys.readouterr().out
 
 
 def test_wrong_input_says_what_to_do(tmp_path, capsys):

@@ -1,5 +1,8 @@
 """Tables of encoders as people have them: read, or refused with the line."""
 
+import math
+
+import numpy as np
 import pytest
 
 from dcdrw.trials.rolling import table_samples
@@ -9,6 +12,10 @@ from tests.tracker.walking import walk
 TRUTH = walk(8.0, 100.0)
 TABLE = 'time,psi1,psi2\n' + ''.join(
     f'{time},{front},{rear}\n' for time, front, rear in zip(TRUTH.time, TRUTH.front, TRUTH.rear, strict=True)
+)
+IN_DEGREES = 'time [ms],psi1 [deg],psi2_deg\n' + ''.join(
+    f'{1e3 * time},{math.degrees(front)},{math.degrees(rear)}\n'
+    for time, front, rear in zip(TRUTH.time, TRUTH.front, TRUTH.rear, strict=True)
 )
 
 
@@ -21,22 +28,38 @@ TABLE = 'time,psi1,psi2\n' + ''.join(
         TABLE.replace('\n', ',\n').encode(),
         TABLE.replace('\n', '\n\n').encode(),
         TABLE.replace('time,psi1,psi2', '"time","psi1","psi2"').encode(),
+        TABLE.encode('utf-16'),
+        TABLE.replace(',', '\t').encode(),
+        TABLE.replace(',', ';').replace('.', ',').encode(),
+        b'# encoders\n' + TABLE.replace('time,psi1,psi2', 'Time [s],Psi1 (rad),psi2').encode(),
+        IN_DEGREES.encode(),
     ],
-    ids=['plain', 'bom', 'crlf', 'trailing commas', 'blank lines', 'quotes'],
+    ids=[
+        *('plain', 'bom', 'crlf', 'trailing commas', 'blank lines', 'quotes', 'utf-16', 'tabs', 'semicolons'),
+        *('remarks and units', 'other units'),
+    ],
 )
 def test_a_table_is_read_as_spreadsheets_write_it(content, tmp_path):
     (tmp_path / 'table.csv').write_bytes(content)
     samples = table_samples(tmp_path / 'table.csv', RigParams())
     assert len(samples.seconds) == pytest.approx(800, abs=5)
+    assert samples.seconds[-1] == pytest.approx(8.0, abs=0.1)
+    assert np.ptp(samples.rotations[:, 0]) == pytest.approx(np.ptp(TRUTH.front), rel=0.02)
 
 
 @pytest.mark.parametrize(
     ('content', 'message'),
     [
-        (TABLE.encode('utf-16'), 'line 1: byte 0xff is not UTF-8 text'),
-        (TABLE.replace(',', ';').encode(), 'must have columns time, psi1, psi2'),
-        (TABLE.replace(',', '\t').encode(), 'must have columns time, psi1, psi2'),
-        (b'time,psi1,psi1,psi2\n0,0,0,0\n', 'has the column psi1 2 times'),
+        (TABLE.replace(',', ' ').encode(), 'must have columns time, psi1, psi2'),
+        (TABLE.replace(',', ';').encode() + b'9;"1,5";1', "line 802: '1,5' is not a number"),
+        (b'time,psi1,psi1,psi2\n0,0,0,0\n', 'has the columns psi1 and psi1: leave one'),
+        (b'time,psi1,psi1_deg,psi2\n0,0,0,0\n', 'has the columns psi1 and psi1_deg: leave one'),
+        (b'time,psi1 [turns],psi2\n0,0,0\n', "column psi1: 'turns' is not a unit like rad; known are rad, deg, °"),
+        (IN_DEGREES.replace('[ms]', '').encode(), '10 s lie between one sample and the next'),
+        (TABLE.replace('time', 'stamp_ns').encode(), '1e-11 s lie between one sample and the next'),
+        (IN_DEGREES.replace('[deg]', '').replace('_deg', '').encode(), 'are psi1 and psi2 in degrees?'),
+        (b'time,psi1,psi2\n0,0,0\n0.1,0,0\n', 'both wheels roll in'),
+        (b'time,psi1,psi2\n0,0,\n0.1,0,\n', 'both wheels roll in 0 samples'),
         (TABLE.encode() + b'9,inf,1\n', "line 802: 'inf' is not a number"),
         (TABLE.encode() + b'9,1e400,1\n', "line 802: '1e400' is not a number"),
         (TABLE.encode() + b'1_0,1,1\n', "line 802: '1_0' is not a number"),
