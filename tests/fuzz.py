@@ -26,9 +26,11 @@ from dcdrw.recordings.recorder import Recorder, offered_qos
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw.trials.results import read_trial
+from dcdrw.trials.rolling import table_samples
 from dcdrw_control.legs.csv_file import read_legs
 from dcdrw_msgs_py.camera import pinhole, read_camera, write_camera
 from dcdrw_msgs_py.opencv import opencv
+from dcdrw_msgs_py.rig import RigParams
 from dcdrw_sim.motion.cases import read_cases
 from dcdrw_tracker.node.video import VideoFile
 from tests import ROOT
@@ -101,6 +103,7 @@ def readers() -> dict[str, Reader]:
     legs = b'time,left_gyr_x,left_gyr_y,left_gyr_z,left_acc_x,left_acc_y,left_acc_z\n' + b''.join(
         b'%f,0.1,-0.2,1e-3,0,0,9.81\n' % (k / 100) for k in range(40)
     )
+    encoders = b'time,psi1,psi2\n' + b''.join(b'%f,%f,%f\n' % (k / 50, k / 40, k / 40 + 0.13) for k in range(60))
     parts = b'kind,value,name\nspring,5,"soft, long"\ndashpot,100,x\nspring,50,\n'
     mcaps = tuple(bags[kind] for kind in ('killed', 'closed', 'others'))
     return {
@@ -114,6 +117,7 @@ def readers() -> dict[str, Reader]:
         'cases': Reader(read_cases, '.json', (_case(),)),
         'parts': Reader(read_parts, '.csv', (parts,)),
         'legs': Reader(read_legs, '.csv', (legs,)),
+        'encoders': Reader(lambda path: table_samples(path, RigParams()), '.csv', (encoders,)),
         'video': Reader(_watch, '.avi', (video,)),
     }  # fmt: skip
 

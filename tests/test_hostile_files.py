@@ -66,7 +66,7 @@ def test_rig_files_gone_wrong_are_refused(tmp_path_factory, content, reason):
     ('kind', 'content', 'reason'),
     [
         ('parts', b'kind,value,name\nspring,5,"x\n' + b'y' * 200_000 + b'\ndashpot,5,y\n', 'field larger than'),
-        ('legs', b'time,left_force\n0.0,\xff\xfe\n0.1,5\n', 'line 2: byte 0xff is not UTF-8 text'),
+        ('legs', b'time,left_force\n0.0,\xff\xfe\n0.1,5\n', "line 2: 'ÿþ' is not a number"),
     ],
     ids=['parts', 'legs'],
 )
