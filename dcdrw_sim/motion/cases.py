@@ -2,12 +2,13 @@
 
 import json
 import math
+from collections import Counter
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from dcdrw_msgs_py.quantity import suggestion
 from dcdrw_msgs_py.rig import RigParams, WheelParams
-from dcdrw_msgs_py.text_file import read_text
+from dcdrw_msgs_py.text_file import one_line, read_text
 from dcdrw_sim.model.dynamics import State
 from dcdrw_sim.motion.ends import Strike
 from dcdrw_sim.motion.pair import Simulation
@@ -57,13 +58,21 @@ def read_cases(path: Path) -> tuple[list[Case], bool]:
     """
     text = read_text(path)
     try:
-        content = json.loads(text)
+        content = json.loads(text, object_pairs_hook=_object)
     except (ValueError, RecursionError) as error:
         raise ValueError(f'{path} is not JSON: {error}') from None
     entries = content if isinstance(content, list) else [content]
     if not entries:
         raise ValueError(f'{path} holds no case: the list is empty')
     return [_parse(entry, f'{path}, case {index}') for index, entry in enumerate(entries)], isinstance(content, list)
+
+
+def _object(pairs: list[tuple[str, Json]]) -> Record:
+    content = dict(pairs)
+    if len(content) < len(pairs):
+        (twice, _), *_ = Counter(key for key, _ in pairs).most_common(1)
+        raise ValueError(f'the key {twice} stands in one object twice')
+    return content
 
 
 def _parse(entry: Json, where: str) -> Case:
@@ -75,7 +84,7 @@ def _parse(entry: Json, where: str) -> Case:
         for key in keys:
             if key not in allowed:
                 raise ValueError(f'{where}: {key} is not a key of a case{suggestion(key, allowed)}')
-    name = str(raw.get('name', 'case'))
+    name = one_line(raw.get('name', 'case'))
     where = f'{where} ({name})' if 'name' in raw else where
     g, slope, k, b, D0, S0 = (_numbers(raw, key, where)[0] for key in _NUMBERS)
     lengths, masses, alphas = (_numbers(raw, key, where, 2) for key in _PAIRS)

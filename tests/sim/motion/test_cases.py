@@ -100,6 +100,11 @@ def test_a_bad_file_is_refused_with_what_is_wrong_in_it(tmp_path, content, messa
     assert 'case.json' in str(error.value)
 
 
+def test_a_key_that_stands_twice_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r'case\.json.*the key k stands in one object twice'):
+        read(tmp_path, '{"k": 5, "b": 1, "k": 50}')
+
+
 def test_bytes_that_are_no_text_are_refused(tmp_path):
     path = tmp_path / 'case.json'
     path.write_bytes(b'\xff\xfe\x00')
