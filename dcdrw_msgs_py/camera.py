@@ -27,11 +27,14 @@ ALIASES = {
     'thin_prism': 'rational_polynomial',
     'fisheye': 'equidistant',
     'equi': 'equidistant',
+    'kannala_brandt': 'equidistant',
     'kannala_brandt4': 'equidistant',
 }
 """Names that others give to the models."""
 WIDEST = 65_536
 """No picture has more pixels a side."""
+SHORTEST = 0.002
+"""No lens has a focal length that is less of its picture's longer side: it would see 179.5° without a bend."""
 NEWTON_STEPS = 20
 """Enough to invert any lens that can be inverted at all; three do for a usual one."""
 RAY_TOLERANCE = 1e-10
@@ -189,6 +192,11 @@ def make_camera(
             f'{source}: the focal lengths in camera_matrix.data must be > 0, got {K[0, 0]:g} and '
             f'{K[1, 1]:g}; calibrate the camera first (ros2 run camera_calibration cameracalibrator)'
         )
+    if min(K[0, 0], K[1, 1]) < SHORTEST * max(width, height):
+        raise ValueError(
+            f'{source}: focal lengths of {K[0, 0]:g} and {K[1, 1]:g} pixels are none of a picture of {width} x '
+            f'{height}: are they in another unit?'
+        )
     if K[1, 0] or K[2, 0] or K[2, 1] or K[2, 2] != 1.0:
         raise ValueError(
             f'{source}: camera_matrix.data must be fx, 0, cx, 0, fy, cy, 0, 0, 1 row by row, got '
@@ -220,6 +228,8 @@ def _coefficients(model: str, D: Floats, source: str) -> Floats:
 def read_camera(path: Path) -> Camera:
     """Read a calibration file, as `camera_calibration` (ROS), OpenCV's FileStorage or kalibr writes it.
 
+    What `ros2 topic echo --once` shows of a CameraInfo is one, too.
+
     Raises:
         ValueError: not such a file; the key that is missing, wrong or unknown is named.
         OSError: the file cannot be read.
@@ -231,17 +241,19 @@ def read_camera(path: Path) -> Camera:
     cameras = [name for name in content if str(name).startswith('cam') and str(name)[3:].isdecimal()]
     if len(cameras) > 1:
         raise ValueError(f'{path} has several cameras, {", ".join(cameras)}: keep the one that looks at the wheels')
-    return _kalibr(content[cameras[0]], path) if cameras else _calibration(content, path)
+    if cameras or 'intrinsics' in content:
+        return _kalibr(content[cameras[0]] if cameras else content, path)
+    return _calibration(content, path)
 
 
 _NAMES = {
     'image_width': ('image_width', 'width'),
     'image_height': ('image_height', 'height'),
-    'camera_matrix': ('camera_matrix', 'M', 'K', 'cameraMatrix'),
+    'camera_matrix': ('camera_matrix', 'M', 'K', 'k', 'cameraMatrix'),
     'distortion_model': ('distortion_model',),
-    'distortion_coefficients': ('distortion_coefficients', 'D', 'distCoeffs', 'dist_coeffs', 'dist_coeff'),
+    'distortion_coefficients': ('distortion_coefficients', 'D', 'd', 'distCoeffs', 'dist_coeffs', 'dist_coeff'),
 }
-"""What is read of a file by ROS, and by what names OpenCV's users know it."""
+"""What is read of a file by ROS, and by what names its messages and OpenCV's users know it."""
 _BESIDE = (
     *(
         'camera_name',
@@ -255,7 +267,7 @@ _BESIDE = (
     ),
     *('calibration_time', 'nframes', 'nr_of_frames', 'flags', 'fisheye_model', 'board_width', 'board_height'),
     *('square_size', 'marker_size', 'aspectRatio', 'avg_reprojection_error', 'reprojection_error'),
-    *('per_view_reprojection_errors', 'extrinsic_parameters', 'image_points', 'grid_points', 'rms', 'R', 'P'),
+    *('per_view_reprojection_errors', 'extrinsic_parameters', 'image_points', 'grid_points', 'rms', 'R', 'P', 'r', 'p'),
 )
 """What else these files hold."""
 _MATRIX = ('rows', 'cols', 'data', 'dt')
@@ -273,7 +285,10 @@ def _calibration(content: dict[Any, Any], path: Path) -> Camera:
     _refuse_unknown(content, [*(name for names in _NAMES.values() for name in names), *_BESIDE], path)
 
     def value(name: str) -> Any:
-        return next((content[key] for key in _NAMES[name] if key in content), None)
+        there = [key for key in _NAMES[name] if key in content]
+        if len(there) > 1:
+            raise ValueError(f'{path} has both {" and ".join(there)}: leave one')
+        return content[there[0]] if there else None
 
     def data(name: str) -> list[Any]:
         held = value(name)

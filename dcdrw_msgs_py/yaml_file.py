@@ -137,6 +137,7 @@ def parse_yaml(text: str) -> Any:
     """
     if text.startswith('%YAML:'):  # OpenCV's own spelling of the directive
         text = text.partition('\n')[2]
+    text = re.sub(r'^---\s*\Z', '', text, flags=re.MULTILINE)  # the end of a message, as `ros2 topic echo` shows it
     depth = 0
     for count, event in enumerate(yaml.parse(text, _Loader)):
         if count > MOST_VALUES:

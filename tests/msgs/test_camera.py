@@ -156,6 +156,11 @@ def content(**changes: object) -> dict[str, object]:
             {'camera_matrix': {'data': [0.0] * 9}},
             r'focal lengths .* must be > 0, got 0 and 0; calibrate the camera first',
         ),
+        (
+            {'camera_matrix': {'data': [0.7, 0.0, 0.5, 0.0, 1.25, 0.5, 0.0, 0.0, 1.0]}},
+            'focal lengths of 0.7 and 1.25 pixels are none of a picture of 1280 x 720: are they in another unit',
+        ),
+        ({'K': [1.0] * 9}, 'has both camera_matrix and K: leave one'),
         ({'distortion_model': 'ftheta'}, "must be plumb_bob or rational_polynomial or equidistant, got 'ftheta'"),
         ({'distortion_model': 3}, 'distortion_model must be a string, got 3'),
         ({'distortion_model': 'equidistant'}, 'an equidistant .* lens has 4 coefficients'),
@@ -258,8 +263,35 @@ calibration_time: "2026-11-25"
 """
 
 
+ECHO = """header:
+  stamp:
+    sec: 1
+    nanosec: 2
+  frame_id: camera
+height: 720
+width: 1280
+distortion_model: kannala_brandt
+d: [-0.05, 0.01, -0.002, 0.0003]
+k: [900.0, 0.0, 640.0, 0.0, 905.0, 355.0, 0.0, 0.0, 1.0]
+r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+p: [900.0, 0.0, 640.0, 0.0, 0.0, 905.0, 355.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+binning_x: 0
+binning_y: 0
+roi: {x_offset: 0, y_offset: 0, height: 0, width: 0, do_rectify: false}
+---
+"""
+
+
 @pytest.mark.parametrize(
-    'text', [OPENCV.replace('FISHEYE', 'fisheye_model: 1\n'), KALIBR, VOXL], ids=['OpenCV', 'kalibr', 'voxl']
+    'text',
+    [
+        OPENCV.replace('FISHEYE', 'fisheye_model: 1\n'),
+        KALIBR,
+        KALIBR.replace('cam0:\n', ''),
+        VOXL,
+        ECHO,
+    ],
+    ids=['OpenCV', 'kalibr', 'kalibr, one camera', 'voxl', 'ros2 topic echo'],
 )
 def test_files_of_other_calibrations_are_read(text, tmp_path):
     path = tmp_path / 'camera.yaml'
