@@ -56,7 +56,7 @@ def number(cell: str) -> float:
     return value
 
 
-def check_pace(path: Path, seconds: Floats) -> None:
+def check_pace(path: Path, seconds: Floats, mend: str = 'Name it then, as time [ms]') -> None:
     """Refuse times that grow as those of no leg or wheel: they are in another unit.
 
     Raises:
@@ -66,6 +66,5 @@ def check_pace(path: Path, seconds: Floats) -> None:
     pace = float(np.median(np.diff(seconds))) if len(seconds) > 1 else CLOSEST
     if not CLOSEST <= pace < WIDEST:
         raise ValueError(
-            f'{path}: {pace:.3g} s lie between one sample and the next: is the time in another unit? Then name it, as '
-            'time [ms]'
+            f'{path}: {pace:.3g} s lie between one sample and the next: is the time in another unit? {mend}'
         )

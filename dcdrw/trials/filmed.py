@@ -18,11 +18,13 @@ from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.suite.parameter_file import read_parameter_file
 from dcdrw.trials.shots import Files, writing_video
 from dcdrw_msgs_py.camera import Camera, read_camera
+from dcdrw_msgs_py.columns import check_pace
 from dcdrw_msgs_py.frame import Frame
 from dcdrw_msgs_py.opencv import opencv
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND, JointSample
 from dcdrw_msgs_py.tagging import TagParams
+from dcdrw_msgs_py.text_file import read_rows
 from dcdrw_msgs_py.words import counted
 from dcdrw_tracker.gait.phase import PhaseParams
 from dcdrw_tracker.node.debug_image import draw
@@ -32,6 +34,8 @@ from dcdrw_tracker.node.video import VideoFile
 from dcdrw_tracker.tags.wheel_view import PairViewParams, WheelView
 from dcdrw_tracker.wheels.wheel_track import TrackParams
 
+LATEST = 2**63
+"""No stamp is so late [ns]."""
 AHEAD = 4
 """Frames that are decoded while others are tracked."""
 FRAMES = (
@@ -153,7 +157,8 @@ class TrackedVideo:
         """
         status, tags = self.tracker.status(), self.params.tags
         if not status.angles.views:
-            raise ValueError(self.complaint or f'{self.path}: there is no frame between --from and --to')
+            where = ' between --from and --to' if self.video.read else ''
+            raise ValueError(self.complaint or f'{self.path}: there is no frame{where}')
         frames = f'{self.path}: in {counted(status.angles.views, "frame")}'
         looked = f'of family {tags.family} (family, front.ids and rear.ids in --rig)'
         if not (status.front.frames or status.rear.frames):
@@ -189,12 +194,16 @@ class TrackedVideo:
         path = options.stamps or (beside if beside.exists() and not options.frame_rate else None)
         if path is None:
             return []
-        try:
-            stamps = [int(line.split(',')[0]) for line in path.read_text(encoding='utf-8').split()[1:]]
-        except ValueError as error:
-            raise ValueError(f'{path} must have a heading, then a time stamp in ns a line: {error}') from None
-        if not stamps or min(np.diff(stamps), default=0) < 0:
+        stamps = []
+        for place, (line, (cell, *_)) in enumerate(read_rows(path)):
+            try:
+                stamps.append(int(cell))
+            except ValueError:
+                if place:  # else the heading
+                    raise ValueError(f'{path}, line {line}: {cell!r} is not a time stamp in ns') from None
+        if not stamps or min(np.diff(stamps), default=0) < 0 or not -LATEST < stamps[0] <= stamps[-1] < LATEST:
             raise ValueError(f'{path}: the time stamps must grow from line to line')
+        check_pace(path, np.unique(stamps) / SECOND, 'Stamps are in ns')
         return stamps
 
 

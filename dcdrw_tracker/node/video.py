@@ -20,8 +20,8 @@ RAW_RATE = 25.0
 """What FFmpeg makes of a stream without index and stamps (raw MJPEG, H.264) [Hz]."""
 ENDS_EARLY = 0.98
 """A video that yields less than this share of the frames that it promises is truncated."""
-
-
+PICTURES = '.png', '.jpg', '.jpeg', '.bmp', '.tif', '.tiff', '.webp', '.pgm', '.ppm'
+"""Endings of pictures, which OpenCV takes for videos of one frame."""
 LARGEST_PICTURE = 2**26
 """Pixels of a picture beyond which a video is taken to be damaged."""
 
@@ -52,6 +52,8 @@ class VideoFile:
             self.own_rate = 0.0
         self.count = int(self._told(cv2.CAP_PROP_FRAME_COUNT))
         """Frames that the file promises; 0 where it does not say."""
+        if self.count <= 1 and path.suffix.lower() in PICTURES:
+            raise ValueError(f'{path} is a picture: a video of the rig is needed')
         self.read = 0
         """Frames that have been read."""
 

@@ -271,7 +271,9 @@ def raw_stream(path, frames=5):
         (['--debug', 'video.gif'], 'a video must end in .mp4, .avi, .mkv, got video.gif'),
         (['--from', '100', '--to', '200'], 'there is no frame between --from and --to'),
         (['--from', '3', '--to', '2'], '--from must be ≥ 0 s and less than --to, got 3 and 2'),
-        (['--stamps', 'half.yaml'], 'half.yaml must have a heading, then a time stamp in ns a line'),
+        (['--stamps', 'half.yaml'], "rear.ids: [18]}' is not a time stamp in ns"),
+        (['--stamps', 'ms.csv'], 'ms.csv: 3.3e-08 s lie between one sample and the next'),
+        (['--stamps', 'bare.csv'], 'has more frames than there are time stamps: 3'),
         (['--stamps', 'few.csv'], 'has more frames than there are time stamps: 2'),
         (['--stamps', 'back.csv'], 'back.csv: the time stamps must grow from line to line'),
     ],
@@ -289,7 +291,9 @@ def test_wrong_input_is_told_in_one_line_and_leaves_nothing(film, tmp_path, monk
         Path(f'{name}.yaml').write_text(f'/**:\n  ros__parameters: {{{values}}}\n')
     Path('full').mkdir()
     Path('full/summary.json').write_text('{}')
-    Path('few.csv').write_text('stamp_ns\n1\n2\n')
+    Path('few.csv').write_text('stamp_ns\n0\n33000000\n')
+    Path('bare.csv').write_text('0\n33000000\n66000000\n')
+    Path('ms.csv').write_text('stamp_ms\n' + ''.join(f'{33 * k}\n' for k in range(100)))
     Path('back.csv').write_text('stamp_ns\n3\n2\n')
     Path('torn.mp4').write_bytes(film.read_bytes()[:100_000])
     raw_stream(Path('raw.mjpeg'))

@@ -189,3 +189,10 @@ def test_stamps_of_every_source_grow(tmp_path):
         assert all(0 < b - a < 50_000_000 for a, b in pairwise(stamps))
         assert stamps[-1] == pytest.approx(39 / 29.97 * 1e9, abs=2e6)
         assert math.isfinite(stamps[0])
+
+
+def test_a_picture_is_no_video(tmp_path):
+    path = tmp_path / 'rig.PNG'
+    assert opencv().imwrite(str(path), np.zeros((48, 64, 3), np.uint8))
+    with pytest.raises(ValueError, match=r'rig\.PNG is a picture: a video of the rig is needed'):
+        VideoFile(path)
