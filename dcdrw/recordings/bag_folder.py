@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from dcdrw.console import in_words
 from dcdrw.recordings.recorder import INFORMATION, METADATA
 from dcdrw_msgs_py.yaml_file import read_yaml
 
@@ -99,11 +100,8 @@ def _metadata(path: Path) -> tuple[dict[str, Any], list[str]]:
         return {}, []
     try:
         content = read_yaml(path)
-    except ValueError as error:
-        return {}, [f'{error}; the recording is read without it']
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        return {}, [f'{path}: {reason}; the recording is read without it']
+    except (ValueError, OSError) as error:
+        return {}, [f'{in_words(error)}; the recording is read without it']
     told = content.get(INFORMATION) if isinstance(content, dict) else None
     return (
         (told, []) if isinstance(told, dict) else ({}, [f'{path} is none of rosbag2; the recording is read without it'])

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from dcdrw.console import in_words
 from dcdrw.recordings.bag_file import CDR, BagFile, Message, RecordedTopic
 from dcdrw.recordings.bag_folder import COMPRESSIONS, find_bag
 from dcdrw.recordings.joint_batch import JointBatch, decode_joints
@@ -183,7 +184,7 @@ class Recording(AbstractContextManager['Recording']):
                 McapFile(inner, name) if inner.suffix == '.mcap' else SqliteFile(inner, name, self._scratch())
             )
         except (ValueError, OSError) as error:
-            self._lost.append(str(error))
+            self._lost.append(in_words(error))
             return
         self._stack.callback(file.close)
         self._files.append(file)

@@ -30,7 +30,7 @@ class VideoFile:
     """A video file, frame by frame; `frame_rate` [Hz], where it is a number, takes the place of the file's own stamps.
 
     Raises:
-        OSError: there is no such file.
+        OSError: there is no such file, or it cannot be read.
         ValueError: it is not a video that can be read.
 
     """
@@ -39,6 +39,8 @@ class VideoFile:
         cv2 = opencv()
         if not path.is_file():
             raise FileNotFoundError(f'there is no video {path}')
+        with path.open('rb'):  # OpenCV does not tell why it cannot
+            pass
         self._path, self._given_rate = path, frame_rate
         self._capture = cv2.VideoCapture(str(path))
         if not self._capture.isOpened():

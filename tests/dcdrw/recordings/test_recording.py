@@ -564,3 +564,13 @@ def test_a_pipe_is_no_recording_and_keeps_nobody_waiting(tmp_path):
     os.mkfifo(tmp_path / 'pipe.mcap')
     with pytest.raises(ValueError, match=r'pipe\.mcap is not a recording'):
         Recording(tmp_path / 'pipe.mcap')
+
+
+def test_a_part_that_nobody_may_read_is_told_without_the_systems_numbers(tmp_path, monkeypatch):
+    def refuse(path, name):
+        raise PermissionError(13, 'Permission denied', name)
+
+    path = write_bag(tmp_path / 'bag', [(0, joint_state(0, ['front_wheel'], [0.0]))]) / 'bag.mcap'
+    monkeypatch.setattr('dcdrw.recordings.mcap_file.McapFile', refuse)
+    with pytest.raises(ValueError, match=re.escape(f'{path}: permission denied')):
+        Recording(path)

@@ -4,6 +4,7 @@ import math
 import time
 from contextlib import suppress
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -195,4 +196,14 @@ def test_a_picture_is_no_video(tmp_path):
     path = tmp_path / 'rig.PNG'
     assert opencv().imwrite(str(path), np.zeros((48, 64, 3), np.uint8))
     with pytest.raises(ValueError, match=r'rig\.PNG is a picture: a video of the rig is needed'):
+        VideoFile(path)
+
+
+def test_a_video_that_nobody_may_read_is_told_from_one_that_is_none(tmp_path, monkeypatch):
+    def refuse(path, mode):
+        raise PermissionError(13, 'Permission denied', str(path))
+
+    path = write(tmp_path / 'a.avi')
+    monkeypatch.setattr(Path, 'open', refuse)
+    with pytest.raises(PermissionError, match=r'a\.avi'):
         VideoFile(path)
