@@ -29,6 +29,8 @@ class Bag(NamedTuple):
     """rosbag2's custom_data."""
     messages: int
     """How many the metadata tell of."""
+    lost: list[str]
+    """What was recorded and is not there."""
 
 
 def find_bag(path: Path) -> Bag:
@@ -47,7 +49,7 @@ def find_bag(path: Path) -> Bag:
                 f'{path} is not a recording: give its folder, or a file that ends in {", ".join(STORAGES)}, '
                 f'or one of these and {COMPRESSIONS[0]}'
             )
-        return Bag(path, [path], [], {}, 0)
+        return Bag(path, [path], [], {}, 0, [])
     for folder in (path, path / RECORDING):
         files = sorted((file for file in folder.glob('*') if file.is_file() and is_storage(file)), key=_number)
         files = [file for file in files if not (file.suffix in COMPRESSIONS and file.with_suffix('') in files)]
@@ -70,9 +72,11 @@ def _described(folder: Path, files: list[Path]) -> Bag:
     named = [file for name in (names if isinstance(names, list) else []) if (file := _named(str(name), files))]
     named = list(dict.fromkeys(named))  # one that is named twice has its messages once
     missing = [str(name) for name in names if not _named(str(name), files)] if isinstance(names, list) else []
+    missing = list(dict.fromkeys(missing))
+    lost: list[str] = []
     if missing:
         others = [file for file in files if file not in named]
-        notes.append(
+        (notes if len(others) >= len(missing) else lost).append(
             f'{METADATA} of {folder} names {_list(missing)}, which is not there'
             + (f'; {_list(file.name for file in others)} is read in its place' if others else '')
         )
@@ -91,6 +95,7 @@ def _described(folder: Path, files: list[Path]) -> Bag:
         notes,
         {str(name): str(value) for name, value in about.items()} if isinstance(about, dict) else {},
         count if isinstance(count, int) else 0,
+        lost,
     )
 
 

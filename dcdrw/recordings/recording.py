@@ -45,7 +45,7 @@ class Recording(AbstractContextManager['Recording']):
         self.about = bag.about
         """What was kept with it (rosbag2's custom_data)."""
         self._notes = list(bag.notes)
-        self._lost: list[str] = []
+        self._lost = list(bag.lost)
         self._files: list[BagFile] = []
         self._stack = ExitStack()
         try:

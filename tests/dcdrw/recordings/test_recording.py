@@ -275,6 +275,15 @@ def test_renamed_file_is_read_and_the_metadata_that_name_another_are_told_of(tmp
         ]
 
 
+def test_a_part_that_the_metadata_name_and_that_is_gone_is_damage(tmp_path):
+    bag = write_bag(tmp_path / 'bag', MESSAGES)
+    metadata = bag / 'metadata.yaml'
+    metadata.write_text(metadata.read_text().replace('  - bag.mcap\n', '  - bag.mcap\n  - bag_1.mcap\n'))
+    stamps, damage = read(bag)
+    assert len(stamps) == len(MESSAGES)
+    assert damage == [f'metadata.yaml of {bag} names bag_1.mcap, which is not there']
+
+
 def test_parts_of_a_killed_recorder_are_one_recording(tmp_path):
     """Eleven files, some compressed already, one twice for the kill came between; no metadata.yaml yet."""
     folder = tmp_path / 'bag'
