@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from dcdrw.trials.analysis import Analysis
 from dcdrw.trials.motion import MotionTable
@@ -40,6 +41,7 @@ def rolling_samples(
     return free_rolling(rig, seconds[chosen], np.column_stack([motion.rotation1, motion.rotation2])[chosen])
 
 
+WHEELS = 'psi1', 'psi2'
 TIMES = {'time': 's', 'stamp_ns': 'ns'}
 TURNS = {'': 'rad', '_deg': 'deg'}
 """Columns of time, and endings of those of a wheel, with their units where the heading names none."""
@@ -65,10 +67,7 @@ def table_samples(path: Path, rig: RigParams, begin: float = 0.0, end: float = m
     headings = [heading(text) for text in first]
     columns = [
         _column(path, headings, TIMES, 's'),
-        *(
-            _column(path, headings, {wheel + ending: unit for ending, unit in TURNS.items()}, 'rad')
-            for wheel in ('psi1', 'psi2')
-        ),
+        *(_column(path, headings, {wheel + ending: unit for ending, unit in TURNS.items()}, 'rad') for wheel in WHEELS),
     ]
     table: list[list[float]] = []
     last = -math.inf
@@ -93,6 +92,14 @@ def table_samples(path: Path, rig: RigParams, begin: float = 0.0, end: float = m
             f'{path}: no wheel rolls at {np.median(speeds):.3g} rad/s: are psi1 and psi2 in degrees? Then name them '
             'psi1_deg and psi2_deg'
         )
+    for name, turns in zip(WHEELS, psi, strict=True):
+        seen = np.isfinite(turns)
+        close = np.diff(seconds[seen]) < math.pi / PhaseParams().max_speed
+        level = median_filter(turns[seen], 5, mode='mirror')  # without lone wild samples
+        if np.round(np.diff(level)[close] / math.tau).sum():
+            raise ValueError(
+                f'{path}: {name} jumps by whole turns, as an encoder that begins anew with each: unwrap it'
+            )
     chosen = (seconds >= begin) & (seconds <= end)
     try:
         return free_rolling(rig, seconds[chosen], rotations[chosen])

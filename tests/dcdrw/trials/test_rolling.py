@@ -17,6 +17,10 @@ IN_DEGREES = 'time [ms],psi1 [deg],psi2_deg\n' + ''.join(
     f'{1e3 * time},{math.degrees(front)},{math.degrees(rear)}\n'
     for time, front, rear in zip(TRUTH.time, TRUTH.front, TRUTH.rear, strict=True)
 )
+WRAPPED = 'time,psi1,psi2\n' + ''.join(
+    f'{time},{front},{math.remainder(rear, math.tau)}\n'
+    for time, front, rear in zip(TRUTH.time, TRUTH.front, TRUTH.rear, strict=True)
+)
 
 
 @pytest.mark.parametrize(
@@ -58,6 +62,7 @@ def test_a_table_is_read_as_spreadsheets_write_it(content, tmp_path):
         (IN_DEGREES.replace('[ms]', '').encode(), '10 s lie between one sample and the next'),
         (TABLE.replace('time', 'stamp_ns').encode(), '1e-11 s lie between one sample and the next'),
         (IN_DEGREES.replace('[deg]', '').replace('_deg', '').encode(), 'are psi1 and psi2 in degrees?'),
+        (WRAPPED.encode(), 'psi2 jumps by whole turns, as an encoder that begins anew with each: unwrap it'),
         (b'time,psi1,psi2\n0,0,0\n0.1,0,0\n', 'both wheels roll in'),
         (b'time,psi1,psi2\n0,0,\n0.1,0,\n', 'both wheels roll in 0 samples'),
         (TABLE.encode() + b'9,inf,1\n', "line 802: 'inf' is not a number"),
@@ -76,3 +81,11 @@ def test_what_is_no_table_is_refused_in_one_line(content, message, tmp_path):
         table_samples(tmp_path / 'table.csv', RigParams())
     assert message in str(error.value)
     assert '\n' not in str(error.value)
+
+
+@pytest.mark.parametrize('row', [1, 400, -1])
+def test_a_wild_sample_is_no_turn(row, tmp_path):
+    lines = TABLE.splitlines()
+    lines[row] = f'{lines[row].split(",")[0]},500,-500'
+    (tmp_path / 'table.csv').write_text('\n'.join(lines))
+    assert len(table_samples(tmp_path / 'table.csv', RigParams()).seconds) == pytest.approx(800, abs=5)
