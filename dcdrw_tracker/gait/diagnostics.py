@@ -132,7 +132,7 @@ def _message(state: PairState, status: SyncStatus, age: float) -> str:
         # No error here: it changes within a step, and stands elsewhere, younger.
         PairState.LOST: 'lost synchronization: the error has left the band',
         PairState.SYNCHRONIZED: f'synchronized after {counted(status.steps_text, "step")}',
-        PairState.CONVERGING: 'converging: the error does not stay in the band yet',
+        PairState.CONVERGING: 'converging: not in step yet',
     }[state]
 
 

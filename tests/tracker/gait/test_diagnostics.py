@@ -57,7 +57,7 @@ def test_a_person_reads_what_is_wrong() -> None:
         (
             STATUS._replace(too_coarse=True, resolution_percent=37.5),
             0.0,
-            'converging: the error does not stay in the band yet; the encoders are too',
+            'converging: not in step yet; the encoders are too',
         ),
     ):
         assert diagnose_sync(status, age, 1.0).message.startswith(message)
