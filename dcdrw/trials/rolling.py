@@ -85,18 +85,16 @@ def table_samples(path: Path, rig: RigParams, begin: float = 0.0, end: float = m
     check_pace(path, seconds)
     seconds = seconds - seconds[0]
     rotations = np.column_stack(psi)
-    speeds = np.abs(np.diff(rotations, axis=0)) / np.diff(seconds)[:, None]
-    speeds = speeds[np.isfinite(speeds)]
-    if speeds.size and float(np.median(speeds)) > PhaseParams().max_speed:
-        raise ValueError(
-            f'{path}: no wheel rolls at {np.median(speeds):.3g} rad/s: are psi1 and psi2 in degrees? Then name them '
-            'psi1_deg and psi2_deg'
-        )
     for name, turns in zip(WHEELS, psi, strict=True):
         seen = np.isfinite(turns)
-        close = np.diff(seconds[seen]) < math.pi / PhaseParams().max_speed
-        level = median_filter(turns[seen], 5, mode='mirror')  # without lone wild samples
-        if np.round(np.diff(level)[close] / math.tau).sum():
+        passed, turned = np.diff(seconds[seen]), np.diff(median_filter(turns[seen], 5, mode='mirror'))  # none is wild
+        speed = float(np.median(np.abs(turned) / passed)) if turned.size else 0.0
+        if speed > PhaseParams().max_speed:
+            raise ValueError(
+                f'{path}: no wheel rolls at {speed:.3g} rad/s: are psi1 and psi2 in degrees? Then name them '
+                'psi1_deg and psi2_deg'
+            )
+        if np.round(turned[passed < math.pi / PhaseParams().max_speed] / math.tau).sum():
             raise ValueError(
                 f'{path}: {name} jumps by whole turns, as an encoder that begins anew with each: unwrap it'
             )

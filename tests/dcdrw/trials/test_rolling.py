@@ -89,3 +89,10 @@ def test_a_wild_sample_is_no_turn(row, tmp_path):
     lines[row] = f'{lines[row].split(",")[0]},500,-500'
     (tmp_path / 'table.csv').write_text('\n'.join(lines))
     assert len(table_samples(tmp_path / 'table.csv', RigParams()).seconds) == pytest.approx(800, abs=5)
+
+
+def test_a_table_of_which_every_third_row_is_wild_is_read(tmp_path):
+    lines = TABLE.splitlines()
+    lines[3::3] = [f'{line.split(",")[0]},{place % 7},{-(place % 5)}' for place, line in enumerate(lines[3::3])]
+    (tmp_path / 'table.csv').write_text('\n'.join(lines))
+    assert table_samples(tmp_path / 'table.csv', RigParams()).plausible.mean() == pytest.approx(2 / 3, abs=0.1)
