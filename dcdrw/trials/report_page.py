@@ -45,7 +45,7 @@ dt { font-weight: 600; } dd { margin: 0; overflow-wrap: anywhere; }
   @page { margin: 12mm; }
   body { font-size: 10pt; max-width: none; margin: 0; padding: 0; }
   table { font-size: 7pt; } th, td { padding: .15rem .2rem; }
-  figure { margin: .4rem 0; padding: 0; } figure svg { width: 96%; margin: auto; }
+  figure { margin: .4rem 0; padding: 0; } figure svg { width: 96%; max-height: 125mm; margin: auto; }
   figcaption { font-size: 8pt; padding: 0; } dl { font-size: 8pt; padding: .2rem .6rem; break-inside: avoid; }
   h2 { margin-top: 0; }
   .verdict { font-size: 11pt; }
