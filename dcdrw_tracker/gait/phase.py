@@ -215,6 +215,11 @@ class PhaseEstimator:
         self._refused[why] += samples
         self._refusal = why
 
+    @property
+    def accepted(self) -> int:
+        """How many samples were accepted."""
+        return self._accepted
+
     def note_foreign(self, messages: int = 1) -> None:
         """Count messages that name neither wheel: another robot's, unless the wheels have other names."""
         self._foreign += messages

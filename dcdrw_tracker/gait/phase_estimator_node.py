@@ -51,17 +51,15 @@ class PhaseEstimatorNode(Node):
 
     def _on_joints(self, message: Any) -> None:
         self._rivals.hear(message.name)
-        is_foreign = not any(joint in message.name for joint in self._joints)
-        if is_foreign and self._estimator.status().accepted:
-            self._estimator.note_foreign()
-            return
         try:
             read = self._reader.read_any(message)
         except ValueError as error:
-            if is_foreign:
-                self._estimator.note_foreign()
-            else:
+            if any(joint in message.name for joint in self._joints):
                 self._estimator.refuse('unreadable')
+            else:
+                self._estimator.note_foreign()
+                if self._estimator.accepted:  # another robot's, beside ours
+                    return
             self.get_logger().warning(f'joint_states: {error}', throttle_duration_sec=1.0)
             return
         if isinstance(read, LoneWheel):
