@@ -28,15 +28,16 @@ def heading(text: str) -> tuple[str, str]:
     return (match[1].lower(), match[2] or '') if match else (text.strip().lower(), '')
 
 
-def size(unit: str, wanted: str) -> float:
-    """The size of a unit in the one that is wanted, of SI.
+def size(path: Path, name: str, unit: str, wanted: str) -> float:
+    """The size of the unit of a file's column in the one that is wanted, of SI.
 
     Raises:
-        ValueError: it is none of that kind.
+        ValueError: it is none of that kind; names the file and the column.
 
     """
     if unit not in SIZES[wanted]:
-        raise ValueError(f'{unit!r} is not a unit like {wanted}; known are {", ".join(SIZES[wanted])}')
+        known = ', '.join(SIZES[wanted])
+        raise ValueError(f'{path}, column {name}: {unit!r} is not a unit like {wanted}; known are {known}')
     return SIZES[wanted][unit]
 
 

@@ -84,17 +84,17 @@ def table_samples(path: Path, rig: RigParams, begin: float = 0.0, end: float = m
     seconds, *psi = np.array(table).T
     check_pace(path, seconds)
     seconds = seconds - seconds[0]
-    rotations = np.column_stack(psi)
+    rotations, fastest = np.column_stack(psi), PhaseParams().max_speed
     for name, turns in zip(WHEELS, psi, strict=True):
         seen = np.isfinite(turns)
         passed, turned = np.diff(seconds[seen]), np.diff(median_filter(turns[seen], 5, mode='mirror'))  # none is wild
         speed = float(np.median(np.abs(turned) / passed)) if turned.size else 0.0
-        if speed > PhaseParams().max_speed:
+        if speed > fastest:
             raise ValueError(
                 f'{path}: no wheel rolls at {speed:.3g} rad/s: are psi1 and psi2 in degrees? Then name them '
                 'psi1_deg and psi2_deg'
             )
-        if np.round(turned[passed < math.pi / PhaseParams().max_speed] / math.tau).sum():
+        if np.round(turned[passed < math.pi / fastest] / math.tau).sum():
             raise ValueError(
                 f'{path}: {name} jumps by whole turns, as an encoder that begins anew with each: unwrap it'
             )
@@ -118,7 +118,4 @@ def _column(
     if len(found) > 1:
         raise ValueError(f'{path} has the columns {" and ".join(name for _, name, _ in found)}: leave one')
     ((place, name, unit),) = found
-    try:
-        return place, size(unit or names[name], wanted)
-    except ValueError as error:
-        raise ValueError(f'{path}, column {name}: {error}') from None
+    return place, size(path, name, unit or names[name], wanted)

@@ -81,7 +81,7 @@ def read_legs(path: Path, rate: float = math.nan) -> LegTable:
             raise ValueError(f'{path}: the column {name} has no number: leave it out')
         columns[Leg(found[1] or FRONT, found[2] or SIDES[0])][found[3]] = column
         if unit and (wanted := _UNITS.get(re.sub('_[xyz]$', '', found[3]))):
-            column *= _size(path, name, unit, wanted)
+            column *= size(path, name, unit, wanted)
         elif found[3][:3] == 'gyr':
             turning.append(column)
     degrees = any((np.abs(column) > FASTEST).any() for column in turning)
@@ -133,18 +133,11 @@ def _read(path: Path) -> tuple[list[tuple[str, str]], Floats]:
     return headings, np.array(table)
 
 
-def _size(path: Path, name: str, unit: str, wanted: str) -> float:
-    try:
-        return size(unit, wanted)
-    except ValueError as error:
-        raise ValueError(f'{path}, column {name}: {error}') from None
-
-
 def _seconds(path: Path, name: str, unit: str, first: Floats, rate: float) -> Floats:
     if not math.isnan(rate):
         seconds = np.arange(len(first)) / rate
     elif name in _TIMES:
-        seconds = first * _size(path, name, unit or _TIMES[name], 's')
+        seconds = first * size(path, name, unit or _TIMES[name], 's')
     else:
         raise ValueError(f'{path} has no column time or stamp_ns: tell how many samples a second it has (--rate)')
     if not (np.abs(seconds) < LATEST).all():
