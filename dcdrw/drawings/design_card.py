@@ -98,8 +98,8 @@ def _write(figure: Any, height: float, title: str, boxes: list[_Box]) -> float:
         below = place - (LARGE * line if box.large else 0.0)
         figure.text(0.06, below, box.text, va='top', fontsize=POINTS, linespacing=1.25)
         place -= box.lines * line
-        corner, height = (LEFT, place + 0.9 * line), (box.lines - 0.5) * line
-        figure.add_artist(Rectangle(corner, WIDTH, height, fill=False, edgecolor=box.colour, linewidth=1.2))
+        corner, tall = (LEFT, place + 0.9 * line), (box.lines - 0.5) * line
+        figure.add_artist(Rectangle(corner, WIDTH, tall, fill=False, edgecolor=box.colour, linewidth=1.2))
     return place
 
 

@@ -32,8 +32,6 @@ LATE = 1.25
 """So much of that time after an answer the timer commands by itself: the next sample comes first, unless it is late."""
 WATCH_SECONDS = 0.1
 """How often other publishers and the clock are looked at [s]."""
-
-
 REPEAT_SECONDS = 1.0
 """The state is told again after so long: of a message that was lost DDS knows only when the next one comes."""
 
