@@ -53,7 +53,7 @@ def write(folder: Path, seconds: float) -> int:
     place, speed = np.column_stack(motion[5:7]), np.column_stack([motion.omega1, motion.omega2])
     coupler = np.column_stack([motion.coupler_length, motion.coupler_rate, motion.coupler_force])
     recorder = Recorder(folder)
-    recorder.add_topic('/joint_states', JOINT_STATE, [offered_qos(True, False)])
+    joints = recorder.add_topic('/joint_states', JOINT_STATE, [offered_qos(True, False)])
     for k, (length, rate, force) in enumerate(coupler):
         message = joint_state(
             header(time_type(1_700_000_000 + k // RATE, k % RATE * 1_000_000), ''),
@@ -62,7 +62,7 @@ def write(folder: Path, seconds: float) -> int:
             np.array([*speed[k], rate]),
             np.array([np.nan, np.nan, force]),
         )
-        recorder.write('/joint_states', bytes(types.serialize_cdr(message, JOINT_STATE)))
+        recorder.write(joints, bytes(types.serialize_cdr(message, JOINT_STATE)))
         if k % (RATE // 2) == 0:
             recorder.flush()
     recorder.close()
@@ -77,7 +77,7 @@ def read(folder: Path) -> None:
 
 def judge(folder: Path) -> None:
     with Recording(folder) as recording:
-        analyze(recording.joints('/joint_states'), TrialParams())
+        analyze(recording.joints(recording.find('joint_states')), TrialParams())
 
 
 def best(works: Sequence[Callable[[Path], None]], folder: Path, rounds: int) -> list[float]:
@@ -151,7 +151,7 @@ def compare_nodes(rounds: int, seconds: float, rate: float) -> None:
             ]
             beside.append(measure([recorder, *suite], suite_errors, seconds))
             with Recording(folder) as recording:
-                stamps = np.concatenate([batch.stamp_ns for batch in recording.joints('/joint_states')])
+                stamps = np.concatenate([batch.stamp_ns for batch in recording.joints(recording.find('joint_states'))])
             kept += len(stamps)
             lacking += round((stamps[-1] - stamps[0]) * rate / 1e9) + 1 - len(stamps)
     for name, results in (('suite', alone), ('suite and recorder', beside)):

@@ -8,8 +8,11 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
 from rosbags.typesys import Stores, get_typestore
 
+from dcdrw.recordings.bag_file import Stream
+
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 JOINT_STATE = 'sensor_msgs/msg/JointState'
+JOINTS = Stream('/joint_states', JOINT_STATE)
 
 
 def joint_state(

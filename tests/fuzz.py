@@ -57,9 +57,9 @@ def _recordings(folder: Path) -> dict[str, bytes]:
     """A recording in each storage."""
     for name, ends in (('killed', Recorder.abort), ('closed', Recorder.close)):
         recorder = Recorder(folder / name)
-        recorder.add_topic('/joint_states', 'sensor_msgs/msg/JointState', [offered_qos(True, False)])
+        joints = recorder.add_topic('/joint_states', 'sensor_msgs/msg/JointState', [offered_qos(True, False)])
         for k, (log_ns, data) in enumerate(_messages()):
-            recorder.write('/joint_states', data, log_ns)
+            recorder.write(joints, data, log_ns)
             if k % 50 == 49:
                 recorder.flush()
         ends(recorder)

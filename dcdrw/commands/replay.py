@@ -116,11 +116,13 @@ def _joints(options: argparse.Namespace, recording: Recording) -> tuple[str, Cal
 
     def messages(begin_ns: int, end_ns: int) -> Iterator[Message]:
         made = derived(begin_ns, end_ns)
-        return as_messages(*made, begin_ns) if made else recording.messages([topic], begin_ns, end_ns)
+        return as_messages(*made, begin_ns) if made else recording.messages([found], begin_ns, end_ns)
 
     made = derived()
-    topic = made[0] if made else joint_topic(recording, options.topic, options.namespace)
-    return topic, messages
+    if made:
+        return made[0], messages
+    found = joint_topic(recording, options.topic, options.namespace)
+    return found.name, messages
 
 
 def _names(rig: Path | None, namespace: str) -> dict[str, str]:

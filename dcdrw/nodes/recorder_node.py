@@ -13,6 +13,7 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import SetBool
 
+from dcdrw.recordings.bag_file import Stream
 from dcdrw.recordings.recorder import (
     FLUSH_SECONDS,
     PARAMETERS,
@@ -151,7 +152,8 @@ class RecorderNode(Node):
         ear = self._ears.get(name)
         if ear and (ear.reliable, ear.latched) == (reliable, latched):
             return
-        if self.recorder and name not in self.recorder.counts:
+        stream = Stream(name, topic.type)
+        if self.recorder and stream not in self.recorder.counts:
             try:
                 self.recorder.add_topic(name, topic.type, [offered_qos(reliable, latched, topic.depth)])
             except ValueError as error:
@@ -169,13 +171,13 @@ class RecorderNode(Node):
             reliable,
             latched,
             self.create_subscription(
-                message_type(topic), name, lambda data: self._on_message(name, data), qos, raw=True
+                message_type(topic), name, lambda data: self._on_message(stream, data), qos, raw=True
             ),
         )
 
-    def _on_message(self, name: str, data: bytes) -> None:
+    def _on_message(self, stream: Stream, data: bytes) -> None:
         if self.recorder:
-            self.recorder.write(name, data)
+            self.recorder.write(stream, data)
 
     def _on_parameters(self, node: str, names: list[str], answer: Any) -> None:
         """Keep a node's parameters, as a file that the suite reads and beside the recording's other metadata."""
@@ -229,7 +231,7 @@ class RecorderNode(Node):
                 'folder': str(recorder.folder),
                 'size [MB]': recorder.size / 1e6,
                 **{parameters_of(node): True for node in self._told},
-                **{messages_of(topic): count for topic, count in recorder.counts.items()},
+                **{messages_of(topic.name): count for topic, count in recorder.counts.items()},
             },
         )
 

@@ -66,8 +66,7 @@ class ReplayNode(Node):
         self.log_ns = part.begin_ns
         """Where in the recording the replay is."""
         self.done = False
-        runs = runs_topic(topic)
-        self._runs_topic = runs if recording.types.get(runs) == RUNS.type else ''
+        self._runs_topic = runs_topic(topic)
         self._found: tuple[int, ...] = ()
         self._since = time.monotonic()
         self._messages: Iterator[Message] = iter(())
@@ -81,7 +80,7 @@ class ReplayNode(Node):
     def _begin(self) -> None:
         part = self._part
         self._messages = self._joint_messages(part.begin_ns, part.end_ns)
-        self._announced = list(self._recording.messages([self._runs_topic])) if self._runs_topic else []
+        self._announced = list(self._recording.messages([self._runs_topic]))
         self._next = next(self._messages, None)
         self._next_ns = _stamp_ns(self._next) if self._next else 0
         self._due_ns = 0

@@ -10,10 +10,19 @@ from dcdrw.recordings.decompression import LARGEST, ZSTD_MAGIC, decompress
 CDR = 'cdr'
 
 
+class Stream(NamedTuple):
+    """What makes messages belong together: a topic of one name may carry several types, each a stream of its own."""
+
+    name: str
+    """Of the topic."""
+    type: str
+    serialization: str = CDR
+
+
 class Message(NamedTuple):
     """One recorded message."""
 
-    topic: str
+    topic: Stream
     log_ns: int
     """When the recorder got it."""
     data: bytes
@@ -35,6 +44,11 @@ class RecordedTopic(NamedTuple):
     """`ros2msg` or `ros2idl`."""
     serialization: str = CDR
 
+    @property
+    def stream(self) -> Stream:
+        """What its messages are found by."""
+        return Stream(self.name, self.type, self.serialization)
+
 
 class BagFile(ABC):
     """One file of a recording, open for reading, with the topics and counts that it holds.
@@ -46,9 +60,8 @@ class BagFile(ABC):
         self.path = path
         self.name = name
         """For messages: the file's name as it was given."""
-        self.topics: dict[str, RecordedTopic] = {}
-        self.counts: dict[str, int] = {}
-        """Messages by topic."""
+        self.topics: dict[Stream, RecordedTopic] = {}
+        self.counts: dict[Stream, int] = {}
         self.start_ns = self.end_ns = 0
         """When the first and the last message came."""
         self.closed = True
@@ -61,7 +74,7 @@ class BagFile(ABC):
         return list(self._damage.values())
 
     @abstractmethod
-    def messages(self, topics: Collection[str], start_ns: int, stop_ns: int) -> Iterator[Message]:
+    def messages(self, topics: Collection[Stream], start_ns: int, stop_ns: int) -> Iterator[Message]:
         """The messages of these topics from start to before stop, in the order in which they came."""
 
     @abstractmethod
@@ -74,3 +87,8 @@ class BagFile(ABC):
             return data
         plain = decompress(data, 'zstd')
         return plain if len(plain) <= LARGEST else b''
+
+
+def full_type(kind: str) -> str:
+    """The name of a type as ROS 2 has it, of one that may be written as ROS 1 does."""
+    return kind.replace('/', '/msg/') if kind.count('/') == 1 else kind

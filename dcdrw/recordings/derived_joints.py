@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from dcdrw.recordings.bag_file import Message
+from dcdrw.recordings.bag_file import Message, Stream
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.joint_recording import serializers
 from dcdrw.recordings.leg_recording import find_topic, leg_readings, leg_topics, namespace_of, wheel_batches
@@ -25,7 +25,7 @@ class WalkParams(NamedTuple):
     legs: LegParams = LegParams()
 
 
-def recorded_walk(recording: Recording, rig: Path | None, namespace: str = '') -> tuple[LegParams, list[str]]:
+def recorded_walk(recording: Recording, rig: Path | None, namespace: str = '') -> tuple[LegParams, list[Stream]]:
     """The parameters of leg_tracker, and the topics of sensors on legs, of which there may be none."""
     params, topics = WalkParams(), leg_topics(recording, namespace)
     space = namespace_of(topics[0]) if topics else namespace
@@ -56,7 +56,7 @@ def derived_joints(
         return None
     poses = pose_topics(recording, namespace)
     if poses:
-        return poses[0].removesuffix(FRONT_POSE.name) + topic, pose_batches(recording, rig, namespace, window)
+        return poses[0].name.removesuffix(FRONT_POSE.name) + topic, pose_batches(recording, rig, namespace, window)
     params, legs = recorded_walk(recording, rig, namespace)
     if not legs:
         return None
@@ -65,14 +65,14 @@ def derived_joints(
     return f'{namespace_of(legs[0])}/{topic}', batches
 
 
-def joint_topic(recording: Recording, topic: str, namespace: str = '') -> str:
+def joint_topic(recording: Recording, topic: str, namespace: str = '') -> Stream:
     """The topic of the joint states that were recorded.
 
     Raises:
         ValueError: there is none, or one in several namespaces; what poses were recorded in its place is told.
 
     """
-    poses = [f'{one_line(name)} ({kind})' for name, kind in recording.types.items() if kind in _POSES]
+    poses = [f'{one_line(found.name)} ({found.type})' for kind in _POSES for found in recording.of_type(kind)]
     try:
         return recording.find(topic, namespace=namespace)
     except ValueError as error:
@@ -93,7 +93,7 @@ _POSES = {
 """Types of messages that tell where a body is."""
 
 
-def _of_both(batches: Iterator[JointBatch], recording: Recording, legs: list[str]) -> Iterator[JointBatch]:
+def _of_both(batches: Iterator[JointBatch], recording: Recording, legs: list[Stream]) -> Iterator[JointBatch]:
     """Those that tell of both halves: before the second is known, and while it is silent, there is no pair."""
     found = False
     for batch in batches:
@@ -103,13 +103,13 @@ def _of_both(batches: Iterator[JointBatch], recording: Recording, legs: list[str
     if not found:
         raise ValueError(
             f'{recording.path}: a trial needs both legs of both halves at one time, dcdrw legs only one leg; '
-            f'recorded are {", ".join(legs)}'
+            f'recorded are {", ".join(leg.name for leg in legs)}'
         )
 
 
 def as_messages(topic: str, batches: Iterator[JointBatch], begin_ns: int) -> Iterator[Message]:
     """The same joint states as they come off the wire, as if recorded from `begin_ns` on when their stamps say so."""
-    names = PhaseParams()
+    names, stream = PhaseParams(), Stream(topic, JOINT_STATES.type)
     serialize, _ = serializers(names)
     first_ns: int | None = None
     for batch in batches:
@@ -121,4 +121,4 @@ def as_messages(topic: str, batches: Iterator[JointBatch], begin_ns: int) -> Ite
             first_ns = stamp_ns if first_ns is None else first_ns
             front, rear = map(Turn, angles.tolist(), rates.tolist())
             sample = JointSample(stamp_ns, front, rear)
-            yield Message(topic, begin_ns + stamp_ns - first_ns, serialize(sample))
+            yield Message(stream, begin_ns + stamp_ns - first_ns, serialize(sample))

@@ -41,15 +41,15 @@ def record_joints(
     # For every node, as a rig file has them: no simulator took part.
     values = {name: value for one in params for name, value in given(one).items()}
     write_changed(None, values, folder / PARAMETERS, 'What the joint states were made with.')
-    recorder.add_topic(TOPIC, JOINT_STATES.type, [offered_qos(True, False, JOINT_STATES.depth)])
-    recorder.add_topic(RUNS_TOPIC, RUNS.type, [offered_qos(True, True, RUNS.depth)])
+    states = recorder.add_topic(TOPIC, JOINT_STATES.type, [offered_qos(True, False, JOINT_STATES.depth)])
+    runs = recorder.add_topic(RUNS_TOPIC, RUNS.type, [offered_qos(True, True, RUNS.depth)])
     serialize, announce = serializers(names)
     run = 0
     for sample in samples:
         if sample.run != run:
             run = sample.run
-            recorder.write(RUNS_TOPIC, announce(sample), sample.stamp_ns)
-        recorder.write(TOPIC, serialize(sample), sample.stamp_ns)
+            recorder.write(runs, announce(sample), sample.stamp_ns)
+        recorder.write(states, serialize(sample), sample.stamp_ns)
     recorder.close()
 
 

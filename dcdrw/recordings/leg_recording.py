@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from dcdrw.recordings.bag_file import Stream
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.recording import BATCH, Recording
 from dcdrw_control.legs.conversion import READERS, hip_readings
@@ -16,8 +17,8 @@ from dcdrw_msgs_py.topics import LEG_JOINT_STATES, LEG_SENSORS, Topic
 _TOPICS = (*LEG_SENSORS.values(), LEG_JOINT_STATES)
 
 
-def find_topic(recording: Recording, topic: Topic, namespace: str = '') -> str | None:
-    """The topic's name in a recording, in this namespace or in whatever one; None where it has none.
+def find_topic(recording: Recording, topic: Topic, namespace: str = '') -> Stream | None:
+    """The topic in a recording, in this namespace or in whatever one; None where it has none.
 
     Raises:
         ValueError: it has one in several namespaces.
@@ -27,15 +28,15 @@ def find_topic(recording: Recording, topic: Topic, namespace: str = '') -> str |
     return recording.find(topic.name, topic.type, namespace) if there else None
 
 
-def leg_topics(recording: Recording, namespace: str = '') -> list[str]:
+def leg_topics(recording: Recording, namespace: str = '') -> list[Stream]:
     """The topics of sensors on legs that a recording has, in this namespace or in whatever one."""
-    return [name for topic in _TOPICS if (name := find_topic(recording, topic, namespace))]
+    return [found for topic in _TOPICS if (found := find_topic(recording, topic, namespace))]
 
 
-def namespace_of(name: str) -> str:
+def namespace_of(found: Stream) -> str:
     """The namespace of a topic of sensors on legs."""
-    ends = (f'/{topic.name}' for topic in _TOPICS if f'/{name}'.endswith(f'/{topic.name}'))
-    return name.removesuffix(next(ends))
+    ends = (f'/{topic.name}' for topic in _TOPICS if f'/{found.name}'.endswith(f'/{topic.name}'))
+    return found.name.removesuffix(next(ends))
 
 
 def leg_readings(

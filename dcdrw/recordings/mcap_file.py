@@ -28,7 +28,7 @@ from mcap.records import (
     SummaryOffset,
 )
 
-from dcdrw.recordings.bag_file import CDR, BagFile, Message, RecordedTopic
+from dcdrw.recordings.bag_file import CDR, BagFile, Message, RecordedTopic, Stream, full_type
 from dcdrw.recordings.decompression import LARGEST, decompress
 from dcdrw_msgs_py.words import by_count, counted
 
@@ -120,13 +120,13 @@ class McapFile(BagFile):
         """Close it."""
         self._file.close()
 
-    def messages(self, topics: Collection[str], start_ns: int, stop_ns: int) -> Iterator[Message]:
+    def messages(self, topics: Collection[Stream], start_ns: int, stop_ns: int) -> Iterator[Message]:
         """The messages of these topics from start to before stop, in the order in which they came.
 
         Chunks may overlap in time: each message is held until no later chunk may begin before it. Where that would
         hold more than 64 MiB, as only a file whose chunks lie in disorder does, what is held goes on as it is.
         """
-        wanted = {key: channel.topic for key, channel in self._channels.items() if channel.topic in topics}
+        wanted = {key: stream for key in self._channels if (stream := self._topic(key).stream) in topics}
         bounds = [2**64]
         for piece in reversed(self._pieces):
             bounds.append(min(bounds[-1], piece.start_ns))
@@ -376,24 +376,24 @@ class McapFile(BagFile):
             self._note('channels', f'the name of the topic is lost of {counted(lost, "message")}')
 
     def _name_topics(self) -> None:
-        for key, channel in self._channels.items():
-            schema = self._schemas.get(channel.schema_id)
-            kind = schema.name if schema else ''
-            if kind.count('/') == 1:
-                kind = kind.replace('/', '/msg/')
-            self.topics.setdefault(
-                channel.topic,
-                RecordedTopic(
-                    channel.topic,
-                    kind,
-                    channel.metadata.get('topic_type_hash', ''),
-                    channel.metadata.get('offered_qos_profiles', ''),
-                    schema.data.decode(errors='replace') if schema else '',
-                    schema.encoding if schema else '',
-                    channel.message_encoding or CDR,
-                ),
-            )
-            self.counts[channel.topic] = self.counts.get(channel.topic, 0) + self._counts.get(key, 0)
+        for key in self._channels:
+            topic = self._topic(key)
+            self.topics.setdefault(topic.stream, topic)
+            self.counts[topic.stream] = self.counts.get(topic.stream, 0) + self._counts.get(key, 0)
+
+    def _topic(self, key: int) -> RecordedTopic:
+        """What the file tells of a channel."""
+        channel = self._channels[key]
+        schema = self._schemas.get(channel.schema_id)
+        return RecordedTopic(
+            channel.topic,
+            full_type(schema.name) if schema else '',
+            channel.metadata.get('topic_type_hash', ''),
+            channel.metadata.get('offered_qos_profiles', ''),
+            schema.data.decode(errors='replace') if schema else '',
+            schema.encoding if schema else '',
+            channel.message_encoding or CDR,
+        )
 
     def _read(self, piece: _Piece) -> Iterator[tuple[int, int, bytes]]:
         """Channel, log time and data of each message in a piece; nothing of one that is damaged."""

@@ -33,7 +33,7 @@ def mend(recording: Recording, folder: Path) -> int:
             recorder.add(topic)
         pending = 0
         for message in recording.messages(list(recording.topics)):
-            recorder.write(*message[::2], message.log_ns)
+            recorder.write(message.topic, message.data, message.log_ns)
             pending += len(message.data)
             if pending > _BETWEEN_FLUSHES:
                 recorder.flush()

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dcdrw.recordings.bag_file import Stream
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.leg_recording import find_topic
 from dcdrw.recordings.recording import BATCH, Recording
@@ -26,10 +27,10 @@ class PoseTracking(NamedTuple):
     bodies: PoseParams = PoseParams()
 
 
-def pose_topics(recording: Recording, namespace: str = '') -> list[str]:
+def pose_topics(recording: Recording, namespace: str = '') -> list[Stream]:
     """The topics of both wheels' poses, the front one's first; none unless both were recorded."""
-    names = [name for topic in (FRONT_POSE, REAR_POSE) if (name := find_topic(recording, topic, namespace))]
-    return names if len(names) == 2 else []
+    found = [one for topic in (FRONT_POSE, REAR_POSE) if (one := find_topic(recording, topic, namespace))]
+    return found if len(found) == 2 else []
 
 
 def pose_batches(
@@ -50,7 +51,7 @@ def pose_batches(
     params = PoseTracking()
     topics = pose_topics(recording, namespace)
     for file in filter(None, (recording.parameters, rig)):
-        params = read_parameter_file(file, params, topics[0].removesuffix(FRONT_POSE.name))
+        params = read_parameter_file(file, params, topics[0].name.removesuffix(FRONT_POSE.name))
     for kind, group in groupby(_followed(recording, params, topics, window), _kind):
         while part := list(islice(group, BATCH)):
             yield _unread(kind, len(part)) if isinstance(kind, str) else _joints(part, kind)
@@ -62,7 +63,7 @@ def _kind(found: JointSample | str) -> int | str:
 
 
 def _followed(
-    recording: Recording, params: PoseTracking, topics: list[str], window: tuple[int, ...]
+    recording: Recording, params: PoseTracking, topics: list[Stream], window: tuple[int, ...]
 ) -> Iterator[JointSample | str]:
     """Joint states, and in the place of poses that are of no use why."""
     pairs, angles = PosePairs(params.bodies, params.track.slope), WheelAngles(params.track)
@@ -71,7 +72,7 @@ def _followed(
         try:
             views = pairs.take(wheels[topic], _pose(message))
         except ValueError as error:
-            yield f'{topic}: {error}'
+            yield f'{topic.name}: {error}'
             continue
         yield from filter(None, map(angles.update, views))
 

@@ -1,31 +1,26 @@
 """The runs that a source announced in a recording: knows no ROS."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
+from dcdrw.recordings.bag_file import Stream
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.recording import Recording
 from dcdrw_msgs_py.samples import SECOND, Runs
 from dcdrw_msgs_py.topics import RUNS
 
 
-def runs_topic(joints: str) -> str:
+def runs_topic(joints: str) -> Stream:
     """Where the source of joint states announces its runs: in the same namespace."""
-    return joints.rpartition('/')[0] + f'/{RUNS.name}'
+    return Stream(joints.rpartition('/')[0] + f'/{RUNS.name}', RUNS.type)
 
 
 def recorded_runs(recording: Recording, joints: str) -> Runs:
     """The runs of the source of a topic of joint states; none where it announced none."""
-    runs, topic = Runs(), runs_topic(joints)
-    if recording.types.get(topic) == RUNS.type:
-        from rosbags.typesys import Stores, get_typestore
-
-        types = get_typestore(Stores.ROS2_JAZZY)
-        for message in recording.messages([topic]):
-            header: Any = types.deserialize_cdr(message.data, RUNS.type)
-            runs.announce(header.stamp.sec * SECOND + header.stamp.nanosec, header.frame_id)
+    runs = Runs()
+    for _, _, header in recording.decoded([runs_topic(joints)]):
+        runs.announce(header.stamp.sec * SECOND + header.stamp.nanosec, header.frame_id)
     return runs
 
 

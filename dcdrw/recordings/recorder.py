@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import dcdrw
-from dcdrw.recordings.bag_file import RecordedTopic
+from dcdrw.recordings.bag_file import RecordedTopic, Stream
 from dcdrw_msgs_py.yaml_file import parse_yaml, yaml_text
 
 FLUSH_SECONDS = 0.5
@@ -113,11 +113,10 @@ class Recorder:
             raise ValueError(f'{folder} exists already, not overwriting') from None
         self.folder = folder
         self.about = origin() | dict(about or {})
-        self.counts: dict[str, int] = {}
-        """Messages by topic."""
+        self.counts: dict[Stream, int] = {}
         self._types = get_typestore(Stores.ROS2_JAZZY)
-        self._topics: dict[str, RecordedTopic] = {}
-        self._channels: dict[str, int] = {}
+        self._topics: dict[Stream, RecordedTopic] = {}
+        self._channels: dict[Stream, int] = {}
         """Channels of the topics that have a message; a topic without one is left out of the recording."""
         self._schemas: dict[str, int] = {}
         self._described = b''
@@ -140,8 +139,8 @@ class Recorder:
         """Bytes on the disk."""
         return self._file.size
 
-    def add_topic(self, name: str, kind: str, qos: Sequence[dict[str, Any]]) -> None:
-        """Add a topic, with what its publishers offer.
+    def add_topic(self, name: str, kind: str, qos: Sequence[dict[str, Any]]) -> Stream:
+        """Add a topic, with what its publishers offer; returns what `write` knows it by.
 
         Raises:
             ValueError: the type is not one of ROS 2 Jazzy's own, so its definition is not known.
@@ -150,18 +149,19 @@ class Recorder:
         if kind not in self._types.types:
             raise ValueError(f'{name} is not recorded: the definition of {kind} is not known')
         definition, _ = self._types.generate_msgdef(kind, ros_version=2)
-        self.add(
+        return self.add(
             RecordedTopic(
                 name, kind, self._types.hash_rihs01(kind), yaml_text(list(qos)).strip(), definition, 'ros2msg'
             )
         )
 
-    def add(self, topic: RecordedTopic) -> None:
-        """Add a topic that is described already."""
-        self._topics[topic.name] = topic
-        self.counts[topic.name] = 0
+    def add(self, topic: RecordedTopic) -> Stream:
+        """Add a topic that is described already; returns what `write` knows it by."""
+        self._topics[topic.stream] = topic
+        self.counts[topic.stream] = 0
+        return topic.stream
 
-    def write(self, topic: str, data: bytes, log_ns: int | None = None) -> None:
+    def write(self, topic: Stream, data: bytes, log_ns: int | None = None) -> None:
         """Take a serialized message (CDR) that has come at a time, by default now."""
         now = self._zero_ns + time.monotonic_ns() if log_ns is None else log_ns
         channel = self._channels.get(topic)
@@ -253,7 +253,7 @@ class Recorder:
                             'offered_qos_profiles': _profiles(topic.qos),
                             'type_description_hash': topic.hash,
                         },
-                        'message_count': self.counts[topic.name],
+                        'message_count': self.counts[topic.stream],
                     }
                     for topic in map(self._topics.__getitem__, self._channels)
                 ],

@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any
 
 from dcdrw.console import in_words
-from dcdrw.recordings.bag_file import CDR, BagFile, Message, RecordedTopic
+from dcdrw.recordings.bag_file import CDR, BagFile, Message, RecordedTopic, Stream
 from dcdrw.recordings.bag_folder import COMPRESSIONS, find_bag
 from dcdrw.recordings.joint_batch import JointBatch, decode_joints
 from dcdrw.recordings.recorder import PARAMETERS, require_libraries
@@ -19,6 +19,8 @@ from dcdrw_msgs_py.words import by_count, counted
 BATCH = 4096
 """Messages that are decoded at once."""
 JOINT_STATE = 'sensor_msgs/msg/JointState'
+_NAMED = 5
+"""Things of one kind that are named in a message at most."""
 _FIRST, _LAST = -(2**63), 2**64
 
 
@@ -57,14 +59,11 @@ class Recording(AbstractContextManager['Recording']):
             self._stack.close()
             raise
         self._files.sort(key=lambda file: file.start_ns)
-        self.topics: dict[str, RecordedTopic] = {}
+        self.topics: dict[Stream, RecordedTopic] = {}
         for one in self._files:
-            for name, topic in one.topics.items():
-                self.topics.setdefault(name, topic)
-        self.types: dict[str, str] = {
-            topic.name: topic.type for topic in self.topics.values() if topic.serialization == CDR
-        }
-        """The topics that ROS 2 reads, and their types."""
+            for stream, topic in one.topics.items():
+                self.topics.setdefault(stream, topic)
+        self._notes += self._names_of_several()
         filled = [one for one in self._files if any(one.counts.values())]
         self.start_ns: int = min((one.start_ns for one in filled), default=0)
         self.end_ns: int = max((one.end_ns for one in filled), default=-1) + 1
@@ -104,21 +103,25 @@ class Recording(AbstractContextManager['Recording']):
         file = (self.path if self.path.is_dir() else self.path.parent) / PARAMETERS
         return file if file.exists() else None
 
-    def count(self, topic: str) -> int:
+    def count(self, topic: Stream) -> int:
         """How many messages a topic has."""
         return sum(file.counts.get(topic, 0) for file in self._files)
 
-    def found(self, name: str, kind: str = JOINT_STATE, namespace: str = '') -> list[str]:
-        """The topics of this name, in this namespace, or in whatever one they are."""
+    def found(self, name: str, kind: str = JOINT_STATE, namespace: str = '') -> list[Stream]:
+        """The topics of this name and type, in this namespace, or in whatever one they are."""
         end = '/'.join(('', *namespace.strip('/').split('/'), name.lstrip('/'))).replace('//', '/')
         return [
             topic
-            for topic, its in self.types.items()
-            if its == kind and (topic == name or (topic == end if namespace else topic.endswith(end)))
+            for topic in self.of_type(kind)
+            if topic.name == name or (topic.name == end if namespace else topic.name.endswith(end))
         ]
 
-    def find(self, name: str, kind: str = JOINT_STATE, namespace: str = '') -> str:
-        """The topic of this name, in this namespace, or in whatever one there is.
+    def of_type(self, kind: str) -> list[Stream]:
+        """The topics of a type, as ROS 2 reads them."""
+        return [topic for topic in self.topics if (topic.type, topic.serialization) == (kind, CDR)]
+
+    def find(self, name: str, kind: str = JOINT_STATE, namespace: str = '') -> Stream:
+        """The topic of this name and type, in this namespace, or in whatever one there is.
 
         Raises:
             ValueError: there is none, or one in several namespaces.
@@ -128,23 +131,29 @@ class Recording(AbstractContextManager['Recording']):
         if len(found) == 1:
             return found[0]
         if found:
-            spaces = sorted(one_line(topic).removesuffix(f'/{name.lstrip("/")}') or '/' for topic in found)
+            spaces = sorted(one_line(topic.name).removesuffix(f'/{name.lstrip("/")}') or '/' for topic in found)
             raise ValueError(
                 f'{self.path} has several suites with {name}: choose one with --namespace {" or ".join(spaces)}'
             )
-        others = ', '.join(one_line(topic) for topic, its in self.types.items() if its == kind) or 'none'
+        others = ', '.join(one_line(topic.name) for topic in self.of_type(kind)) or 'none'
+        namesakes = [
+            f'; its {one_line(topic.name)} is of {_kind(topic)}'
+            for topic in self.topics
+            if topic.name.endswith(f'/{name.lstrip("/")}')
+        ]
         raise ValueError(
             f'{self.path} has no topic {name} of {kind}{f" in {namespace}" if namespace else ""}; '
-            f'of this type it has: {others}'
+            f'of this type it has: {others}{"".join(namesakes[:_NAMED])}'
         )
 
-    def messages(self, topics: Sequence[str], start_ns: int = _FIRST, stop_ns: int = _LAST) -> Iterator[Message]:
+    def messages(self, topics: Sequence[Stream], start_ns: int = _FIRST, stop_ns: int = _LAST) -> Iterator[Message]:
         """The messages of these topics that came from start to before stop, in the order in which they came."""
         for file in self._files:
-            if file.start_ns < stop_ns and start_ns <= file.end_ns:
-                yield from file.messages(topics, start_ns, stop_ns)
+            there = [topic for topic in topics if topic in file.topics]
+            if there and file.start_ns < stop_ns and start_ns <= file.end_ns:
+                yield from file.messages(there, start_ns, stop_ns)
 
-    def joints(self, topic: str, start_ns: int = _FIRST, stop_ns: int = _LAST) -> Iterator[JointBatch]:
+    def joints(self, topic: Stream, start_ns: int = _FIRST, stop_ns: int = _LAST) -> Iterator[JointBatch]:
         """The JointState messages of a topic, decoded many at once, and cut where the names or the frame change."""
         messages = ((log_ns, data) for _, log_ns, data in self.messages([topic], start_ns, stop_ns))
         for _, group in groupby(messages, lambda message: len(message[1])):
@@ -152,20 +161,34 @@ class Recording(AbstractContextManager['Recording']):
                 yield from decode_joints([data for _, data in batch], [log_ns for log_ns, _ in batch])
 
     def decoded(
-        self, topics: Sequence[str], start_ns: int = _FIRST, stop_ns: int = _LAST
-    ) -> Iterator[tuple[str, int, Any]]:
+        self, topics: Sequence[Stream], start_ns: int = _FIRST, stop_ns: int = _LAST
+    ) -> Iterator[tuple[Stream, int, Any]]:
         """The messages of these topics as rosbags decodes them: topic, log time, message; damaged ones are left out."""
         from rosbags.typesys import Stores, get_typestore
 
+        if not self.topics.keys() & set(topics):
+            return
         types = get_typestore(Stores.ROS2_JAZZY)
         for topic, log_ns, data in self.messages(topics, start_ns, stop_ns):
             try:
-                message = types.deserialize_cdr(data, self.types[topic])
+                message = types.deserialize_cdr(data, topic.type)
             except Exception:  # of any kind, for the content may be anything
-                text = f'{self.path}: messages of {one_line(topic)} are malformed'
+                text = f'{self.path}: messages of {one_line(topic.name)} are malformed'
                 self._lost.extend([] if text in self._lost else [text])
                 continue
             yield topic, log_ns, message
+
+    def _names_of_several(self) -> list[str]:
+        """The names that carry messages of more than one type."""
+        streams: dict[str, list[str]] = {}
+        for topic in self.topics:
+            if count := self.count(topic):
+                streams.setdefault(topic.name, []).append(f'{_kind(topic)} ({counted(count, "message")})')
+        several = {name: kinds for name, kinds in streams.items() if len(kinds) > 1}
+        return [
+            f'{self.path}: {one_line(name)} carries messages of several types: {", ".join(kinds[:_NAMED])}'
+            for name, kinds in islice(several.items(), _NAMED)
+        ]
 
     def _open(self, path: Path) -> None:
         """Open a file; one that is none costs only itself where there are others."""
@@ -192,3 +215,9 @@ class Recording(AbstractContextManager['Recording']):
     def _scratch(self) -> Path:
         """A new folder for copies, which goes when the recording is closed."""
         return Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix='dcdrw-')))
+
+
+def _kind(topic: Stream) -> str:
+    """A topic's type, and what its messages are written in where that is not what ROS 2 reads."""
+    kind = one_line(topic.type or 'no type')
+    return kind if topic.serialization == CDR else f'{kind} in {one_line(topic.serialization)}'

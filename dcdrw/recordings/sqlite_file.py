@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from dcdrw.recordings.bag_file import CDR, BagFile, Message, RecordedTopic
+from dcdrw.recordings.bag_file import CDR, BagFile, Message, RecordedTopic, Stream, full_type
 from dcdrw.recordings.decompression import LARGEST
 
 JOURNALS = ('-wal', '-journal')
@@ -81,9 +81,9 @@ class SqliteFile(BagFile):
         """Close it."""
         self._connection.close()
 
-    def messages(self, topics: Collection[str], start_ns: int, stop_ns: int) -> Iterator[Message]:
+    def messages(self, topics: Collection[Stream], start_ns: int, stop_ns: int) -> Iterator[Message]:
         """The messages of these topics from start to before stop, in the order in which they came."""
-        wanted = {key: name for key, name in self._names.items() if name in topics}
+        wanted = {key: stream for key, stream in self._streams.items() if stream in topics}
         for key, log_ns, data in self._rows(wanted, start_ns, min(stop_ns, _LAST_ID)):
             whole = self._whole(data) if isinstance(data, bytes) and isinstance(log_ns, int) else b''
             if whole:
@@ -101,7 +101,7 @@ class SqliteFile(BagFile):
         tables = {name for name, kind in self._query('SELECT name, type FROM sqlite_master') if kind == 'table'}
         if not {'topics', 'messages'} <= tables:
             raise ValueError(f'{self.name} is not a recording: it has no table of topics, or none of messages')
-        self._names: dict[int, str] = {}
+        self._streams: dict[int, Stream] = {}
         definitions: dict[str, tuple[str, str]] = {}
         if 'message_definitions' in tables:
             with suppress(*_DAMAGED, ValueError):
@@ -115,10 +115,10 @@ class SqliteFile(BagFile):
         columns = ('id', 'name', 'type', 'serialization_format', 'offered_qos_profiles', 'type_description_hash')
         asked = ', '.join(column if column in known else "''" for column in columns)
         for key, name, kind, form, qos, digest in self._query(f'SELECT {asked} FROM topics'):
-            self._names[key] = str(name)
-            self.topics[str(name)] = RecordedTopic(
-                str(name), str(kind), str(digest), str(qos), *definitions.get(str(kind), ('', '')), str(form) or CDR
-            )
+            described = definitions.get(str(kind), ('', ''))
+            topic = RecordedTopic(str(name), full_type(str(kind)), str(digest), str(qos), *described, str(form) or CDR)
+            self._streams[key] = topic.stream
+            self.topics.setdefault(topic.stream, topic)
         try:
             counts = self._query('SELECT topic_id, count(*), min(timestamp), max(timestamp) FROM messages GROUP BY 1')
             whole = self._query("SELECT count(*) FROM messages WHERE typeof(timestamp) = 'integer'")
@@ -126,7 +126,7 @@ class SqliteFile(BagFile):
             if whole != [(sum(row[1] for row in counts),)] or not all(isinstance(time, int) for time in times):
                 self._damage['time'] = f'{self.name}: a message has no possible time'
                 raise sqlite3.DataError
-            self._count([row for row in counts if row[0] in self._names])
+            self._count([row for row in counts if row[0] in self._streams])
             self._orderly = self._is_indexed(sum(row[1] for row in counts))
         except (*_DAMAGED, TypeError):
             self._orderly = False
@@ -136,7 +136,7 @@ class SqliteFile(BagFile):
         """Take counts and times by topic."""
         self.counts = dict.fromkeys(self.topics, 0)
         for key, count, _, _ in rows:
-            self.counts[self._names[key]] += count
+            self.counts[self._streams[key]] += count
         if rows:
             self.start_ns, self.end_ns = min(row[2] for row in rows), max(row[3] for row in rows)
 
@@ -181,7 +181,7 @@ class SqliteFile(BagFile):
                 for key, topic, log_ns, data in rows:
                     if key >= at and isinstance(log_ns, int):
                         at = key + 1
-                        if topic in self._names:
+                        if topic in self._streams:
                             yield topic, log_ns, data
                 if at == number:
                     return

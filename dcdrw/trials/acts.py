@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dcdrw.recordings.bag_file import Stream
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.recording import Recording
 from dcdrw_msgs_py.samples import SECOND
@@ -64,8 +65,8 @@ class Clock:
 
 def recorded_acts(recording: Recording, namespace: str, clock: Clock) -> Acts:
     """What the synchronizer of a namespace did; nothing where none was recorded. The joint states must be read."""
-    topic = f'{namespace}/{SYNCHRONIZER_STATE.name}'
-    if recording.types.get(topic) != SYNCHRONIZER_STATE.type or not clock.runs:
+    topic = Stream(f'{namespace}/{SYNCHRONIZER_STATE.name}', SYNCHRONIZER_STATE.type)
+    if topic not in recording.topics or not clock.runs:
         return ()
     every = ((log_ns, str(message.data)) for _, log_ns, message in recording.decoded([topic]))
     said = [next(told) for _, told in groupby(every, key=itemgetter(1))]  # the same is told again and again

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dcdrw.recordings.bag_file import Stream
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.recording import BATCH, Recording
 from dcdrw.trials.motion import Integers, MotionTable
@@ -46,13 +47,13 @@ class Comparison:
 
     def __init__(self, recording: Recording, pitch: float, namespace: str = '') -> None:
         self._topics: dict[str, _Phases | _Errors] = {}
-        name = f'{namespace}/{PHASE_STATE.name}'
-        if recording.types.get(name) == PHASE_STATE.type:
-            self._topics[PHASE_STATE.name] = _Phases(_recorded_phases(recording, name))
+        phases = Stream(f'{namespace}/{PHASE_STATE.name}', PHASE_STATE.type)
+        if phases in recording.topics:
+            self._topics[PHASE_STATE.name] = _Phases(_recorded_phases(recording, phases))
         for topic, scale in ((SYNC_ERROR, pitch), (SYNC_ERROR_PERCENT, 0.0)):
-            name = f'{namespace}/{topic.name}'
-            if recording.types.get(name) == topic.type:
-                self._topics[topic.name] = _Errors(_recorded_errors(recording, name), scale)
+            errors = Stream(f'{namespace}/{topic.name}', topic.type)
+            if errors in recording.topics:
+                self._topics[topic.name] = _Errors(_recorded_errors(recording, errors), scale)
 
     def take(self, motion: MotionTable) -> None:
         """Take the next rows."""
@@ -184,10 +185,10 @@ class _Errors:
         return Agreement(self._recorded + len(self._waiting) + sum(map(len, self._told)), self._equal)
 
 
-def _recorded_phases(recording: Recording, name: str) -> Iterator[_Rows]:
+def _recorded_phases(recording: Recording, topic: Stream) -> Iterator[_Rows]:
     """The recorded `phase_state`."""
     runs = _Runs()
-    for batch in recording.joints(name):
+    for batch in recording.joints(topic):
         if batch.error or not set(_JOINTS) <= set(batch.names):
             continue
         places = [batch.names.index(joint) for joint in _JOINTS]
@@ -196,9 +197,9 @@ def _recorded_phases(recording: Recording, name: str) -> Iterator[_Rows]:
         yield from runs.cut(_restarts(batch), batch.stamp_ns, numbers.reshape(batch.messages, 6), differences)
 
 
-def _recorded_errors(recording: Recording, name: str) -> Iterator[Integers]:
+def _recorded_errors(recording: Recording, topic: Stream) -> Iterator[Integers]:
     """The bits of the recorded errors."""
-    values = (message.data[4:12] for message in recording.messages([name]) if len(message.data) >= 12)
+    values = (message.data[4:12] for message in recording.messages([topic]) if len(message.data) >= 12)
     while part := b''.join(islice(values, BATCH)):
         yield np.frombuffer(part, '<i8')
 

@@ -151,9 +151,9 @@ def _joint_states(
     derived = derived_joints(recording, topic, rig, namespace)
     if derived:
         return derived
-    name = joint_topic(recording, topic, namespace)
-    batches = with_runs(recording.joints(name), recorded_runs(recording, name))
-    return name, _shown(batches, recording.count(name))
+    found = joint_topic(recording, topic, namespace)
+    batches = with_runs(recording.joints(found), recorded_runs(recording, found.name))
+    return found.name, _shown(batches, recording.count(found))
 
 
 def _shown(batches: Iterator[JointBatch], total: int) -> Iterator[JointBatch]:

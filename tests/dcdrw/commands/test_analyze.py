@@ -17,12 +17,14 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.rosbag2.enums import CompressionMode
 
 from dcdrw.cli import main
+from dcdrw.recordings.bag_file import Stream
 from dcdrw.recordings.recording import Recording
 from dcdrw.trials.expectation import UNEXPECTED
 from dcdrw.trials.results import read_trial
 from dcdrw_msgs_py.diagnosis import STEPS_TO_SYNCHRONIZATION
 from dcdrw_msgs_py.messages import stamp_ns
 from dcdrw_msgs_py.rig import RigParams
+from dcdrw_msgs_py.topics import FOOTFALLS
 from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatorParams
 from tests import ROOT
@@ -64,7 +66,10 @@ def test_live_and_offline_agree_to_the_last_bit(live_trial):
     assert int(told) == trial.status.steps_to_synchronization
     for wheel in ('front', 'rear'):
         with Recording(live_trial) as recording:
-            recorded = [stamp_ns(fall.header.stamp) for _, _, fall in recording.decoded([f'/{wheel}_footfalls'])]
+            recorded = [
+                stamp_ns(fall.header.stamp)
+                for _, _, fall in recording.decoded([Stream(f'/{wheel}_footfalls', FOOTFALLS[wheel].type)])
+            ]
         computed = [fall.stamp_ns for fall in trial.footfalls if fall.wheel == wheel]
         assert len(recorded) > 5
         # One of the first can be told before the recorder has found the topic, one of the last after the end.
@@ -88,8 +93,8 @@ def test_results_are_those_of_the_live_trial(live_trial, tmp_path, capsys):
 def test_altered_recording_is_found_out(live_trial, tmp_path):
     """One bit in one recorded sample, and all but this one agree."""
     with Recording(live_trial) as recording:
-        joints = list(recording.messages(['/joint_states']))
-        phases = [data for _, _, data in recording.messages(['/phase_state'])]
+        joints = list(recording.messages([Stream('/joint_states', JOINT_STATE)]))
+        phases = [data for _, _, data in recording.messages([Stream('/phase_state', JOINT_STATE)])]
     message = TYPES.deserialize_cdr(phases[500], JOINT_STATE)
     speeds = message.velocity.copy()
     speeds[0] = np.nextafter(speeds[0], np.inf)  # the front wheel's, by its last bit

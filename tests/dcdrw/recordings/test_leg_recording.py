@@ -26,7 +26,7 @@ from tests.dcdrw.recordings.legs import PERIOD, RATE, write_walk
 )
 def test_readings_come_back_with_their_stamps(tmp_path, kind, first):
     with Recording(write_walk(tmp_path / 'walk', LEGS[:1], 0.5, '/xrl', kind)) as recording:
-        assert leg_topics(recording) == [f'/xrl/front/left_{kind}']
+        assert [topic.name for topic in leg_topics(recording)] == [f'/xrl/front/left_{kind}']
         readings = list(leg_readings(recording, HIPS))
     assert [reading.stamp_ns for reading in readings] == [10**9 + k * 10**9 // RATE for k in range(RATE // 2)]
     assert readings[0] == (10**9, LEGS[0], first)

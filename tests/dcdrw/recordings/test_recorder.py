@@ -23,9 +23,9 @@ from dcdrw.suite.executables import RECORDED
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
 from dcdrw_msgs_py.diagnosis import STATE, RecorderState, messages_of
 from dcdrw_msgs_py.messages import to_stamp
-from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, SYNCHRONIZED, Topic
+from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, ROSOUT, SYNCHRONIZED, Topic
 from tests import ROOT
-from tests.bags import TYPES
+from tests.bags import JOINTS, TYPES
 
 pytestmark = pytest.mark.processes
 
@@ -66,7 +66,7 @@ def said(diagnostics) -> dict[str, str]:
 
 def recorded_stamps(path: Path) -> list[int]:
     with Recording(path) as recording:
-        return [stamp for batch in recording.joints('/joint_states') for stamp in batch.stamp_ns.tolist()]
+        return [stamp for batch in recording.joints(JOINTS) for stamp in batch.stamp_ns.tolist()]
 
 
 def test_messages_are_kept_as_they_came_off_the_wire(bench, tmp_path):
@@ -113,10 +113,8 @@ def test_only_topics_that_somebody_speaks_on_are_recorded_and_the_log_is_among_t
     assert bench.end(process) == 0
     with Recording(tmp_path / 'bag') as recording:
         assert all(recording.count(topic) for topic in recording.topics)
-        assert {'/joint_states', '/rosout', '/diagnostics'} <= recording.topics.keys()
-        logged = [
-            TYPES.deserialize_cdr(data, 'rcl_interfaces/msg/Log') for _, _, data in recording.messages(['/rosout'])
-        ]
+        assert {'/joint_states', '/rosout', '/diagnostics'} <= {topic.name for topic in recording.topics}
+        logged = [message for _, _, message in recording.decoded(recording.found(ROSOUT.name, ROSOUT.type))]
     assert 'heard by the recorder' in [message.msg for message in logged]
     metadata = yaml.safe_load((tmp_path / 'bag' / 'metadata.yaml').read_text())
     for topic in metadata['rosbag2_bagfile_information']['topics_with_message_count']:

@@ -20,12 +20,13 @@ from rosbags.rosbag2 import Reader, StoragePlugin
 from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.rosbag2.enums import CompressionMode
 
+from dcdrw.recordings.bag_file import Stream
 from dcdrw.recordings.joint_batch import decode_joints
 from dcdrw.recordings.mending import mend
 from dcdrw.recordings.recorder import Recorder, offered_qos
 from dcdrw.recordings.recording import Recording
 from dcdrw.trials.results import read_trial
-from tests.bags import TYPES, joint_state, write_bag
+from tests.bags import JOINT_STATE, JOINTS, TYPES, joint_state, write_bag
 
 numbers = st.lists(st.floats(width=64), max_size=5)
 letters = st.text(st.characters(codec='utf-8', exclude_characters='\0'), max_size=9)
@@ -64,7 +65,7 @@ def record(folder: Path, seconds: int = 4, rate: int = 50) -> Recorder:
     recorder.add_topic('/joint_states', 'sensor_msgs/msg/JointState', [offered_qos(True, False, 1000)])
     recorder.add_topic('/synchronized', 'std_msgs/msg/Bool', [offered_qos(True, True, 1)])
     for k in range(seconds * rate):
-        recorder.write('/joint_states', joint_state(k, ['front_wheel', 'rear_wheel'], [k, -k]))
+        recorder.write(JOINTS, joint_state(k, ['front_wheel', 'rear_wheel'], [k, -k]))
         if (k + 1) % rate == 0:
             recorder.flush()
     return recorder
@@ -98,8 +99,8 @@ def read(path: Path) -> tuple[list[int], list[str]]:
     """The stamps of the joint states that can be read, and what could not be; the recording stays as it is."""
     before = contents(path)
     with Recording(path) as recording:
-        stamps = [stamp for batch in recording.joints('/joint_states') for stamp in batch.stamp_ns.tolist()]
-        assert recording.damage or recording.count('/joint_states') == len(stamps)
+        stamps = [stamp for batch in recording.joints(JOINTS) for stamp in batch.stamp_ns.tolist()]
+        assert recording.damage or recording.count(JOINTS) == len(stamps)
         damage = recording.damage
     assert contents(path) == before
     return stamps, damage
@@ -212,7 +213,7 @@ def test_damage_is_named_with_what_can_be_done(unclosed, tmp_path):
 
     copy = damaged_copy(unclosed, tmp_path / 'killed', flip)
     with Recording(copy) as recording:
-        assert recording.count('/joint_states') == 150
+        assert recording.count(JOINTS) == 150
         assert recording.damage == [
             f'{copy}/killed_0.mcap: the chunk at byte {begin} ({end - begin - 9 - 44} bytes) is damaged'
         ]
@@ -225,7 +226,7 @@ def test_damage_is_named_with_what_can_be_done(unclosed, tmp_path):
 def test_recording_in_progress_is_read_and_goes_on(tmp_path):
     recorder = record(tmp_path / 'busy')
     assert read(tmp_path / 'busy' / 'busy_0.mcap') == (list(range(200)), [])
-    recorder.write('/joint_states', joint_state(200, ['front_wheel', 'rear_wheel'], [200, -200]))
+    recorder.write(JOINTS, joint_state(200, ['front_wheel', 'rear_wheel'], [200, -200]))
     recorder.close()
     assert read(tmp_path / 'busy') == (list(range(201)), [])
 
@@ -247,7 +248,7 @@ def test_bags_of_others_are_read(tmp_path, storage, compression):
     bag = write_bag(tmp_path / 'bag', MESSAGES, '/lab/joint_states', storage, compression)
     with Recording(bag) as recording:
         topic = recording.find('joint_states')
-        assert topic == '/lab/joint_states'
+        assert topic.name == '/lab/joint_states'
         assert [data for _, _, data in recording.messages([topic])] == [data for _, data in MESSAGES]
         begin = recording.start_ns
         some = [log_ns for _, log_ns, _ in recording.messages([topic], begin + 10**9, begin + 2 * 10**9)]
@@ -260,8 +261,10 @@ def test_bags_of_others_are_read(tmp_path, storage, compression):
     before = contents(bag)
     for path in (bag, renamed):
         with Recording(path) as recording:
-            assert [data for _, _, data in recording.messages(['/lab/joint_states'])] == [data for _, data in MESSAGES]
-            assert recording.count('/lab/joint_states') == 300
+            assert [data for _, _, data in recording.messages([Stream('/lab/joint_states', JOINT_STATE)])] == [
+                data for _, data in MESSAGES
+            ]
+            assert recording.count(Stream('/lab/joint_states', JOINT_STATE)) == 300
     assert contents(bag) == before
 
 
@@ -269,7 +272,7 @@ def test_renamed_file_is_read_and_the_metadata_that_name_another_are_told_of(tmp
     bag = write_bag(tmp_path / 'bag', MESSAGES)
     (bag / 'bag.mcap').rename(bag / 'walk.mcap')
     with Recording(bag) as recording:
-        assert recording.count('/joint_states') == 300
+        assert recording.count(JOINTS) == 300
         assert recording.notes == [
             f'metadata.yaml of {bag} names bag.mcap, which is not there; walk.mcap is read in its place'
         ]
@@ -308,12 +311,12 @@ def test_a_compressed_file_that_is_cut_off_is_told_of_and_read_as_far_as_it_goes
     cut.write_bytes(packed[: int(share * len(packed))])
     with Recording(cut) as recording:
         assert 'the file is cut off' in recording.damage[0]
-        list(recording.messages(['/joint_states']))
+        list(recording.messages([JOINTS]))
     whole = tmp_path / 'two_frames.mcap.zstd'
     whole.write_bytes(b''.join(map(zstandard.compress, (next(bag.glob('*.mcap')).read_bytes(), b''))))
     with Recording(whole) as recording:
         assert recording.damage == []
-        assert len(list(recording.messages(['/joint_states']))) == 200 * len(MESSAGES)
+        assert len(list(recording.messages([JOINTS]))) == 200 * len(MESSAGES)
 
 
 def test_a_file_that_the_metadata_name_twice_is_read_once(tmp_path):
@@ -322,7 +325,7 @@ def test_a_file_that_the_metadata_name_twice_is_read_once(tmp_path):
     metadata.write_text(metadata.read_text().replace('  - bag.mcap\n', '  - bag.mcap\n' * 3))
     assert metadata.read_text().count('- bag.mcap') == 3
     with Recording(bag) as recording:
-        assert len(list(recording.messages(['/joint_states']))) == len(MESSAGES)
+        assert len(list(recording.messages([JOINTS]))) == len(MESSAGES)
 
 
 def test_broken_part_costs_itself(tmp_path):
@@ -408,7 +411,7 @@ def test_sqlite_recording_in_progress_is_read_and_locks_nobody_out(tmp_path):
     writer = sqlite3.connect(bag / 'bag.db3', timeout=0.0)
     writer.execute('PRAGMA journal_mode = wal')
     with Recording(bag) as recording:
-        messages = recording.messages(['/joint_states'])
+        messages = recording.messages([JOINTS])
         assert next(messages).data == MESSAGES[0][1]
         writer.execute(
             'INSERT INTO messages (topic_id, timestamp, data) SELECT topic_id, timestamp + 1, data FROM messages'
@@ -416,7 +419,7 @@ def test_sqlite_recording_in_progress_is_read_and_locks_nobody_out(tmp_path):
         writer.commit()
         assert sum(1 for _ in messages) == 299
     with Recording(bag) as recording:
-        assert recording.count('/joint_states') == 600
+        assert recording.count(JOINTS) == 600
     writer.close()
 
 
@@ -427,7 +430,7 @@ def test_sqlite_recording_that_is_cut_off_is_read_as_far_as_it_goes(sqlite_bag, 
     content = sqlite_bag.read_bytes()
     path.write_bytes(content[: int(share * len(content))])
     with Recording(path) as recording:
-        read = [message.data for message in recording.messages(['/joint_states'])]
+        read = [message.data for message in recording.messages([JOINTS])]
         assert 'is cut off' in recording.damage[0]
     assert read == [data for _, data in MESSAGES][: len(read)]
     assert len(read) >= (share - 0.4) * len(MESSAGES)
@@ -443,7 +446,7 @@ def test_metadata_that_cannot_be_read_cost_nothing_but_a_note(metadata, tmp_path
     else:
         (bag / 'metadata.yaml').write_text('a: [')
     with Recording(bag) as recording:
-        assert recording.count('/joint_states') == len(MESSAGES)
+        assert recording.count(JOINTS) == len(MESSAGES)
         assert 'the recording is read without it' in recording.notes[0]
         assert not recording.damage
 
@@ -477,10 +480,10 @@ def test_killed_ros2_bag_record_is_read_and_mended(tmp_path):
     file = bag / 'bag.mcap'
     file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
     with Recording(bag) as recording:
-        count = recording.count('/joint_states')
+        count = recording.count(JOINTS)
         assert 4000 < count < 8000
-        assert sum(batch.messages for batch in recording.joints('/joint_states')) == count
-        assert recording.types == {'/joint_states': 'sensor_msgs/msg/JointState'}
+        assert sum(batch.messages for batch in recording.joints(JOINTS)) == count
+        assert list(recording.topics) == [JOINTS]
         assert mend(recording, tmp_path / 'mended') == count
     with Reader(tmp_path / 'mended') as reader:
         assert reader.message_count == count
@@ -519,11 +522,44 @@ def test_wrong_files_are_told_apart(tmp_path):
 def test_topics_are_found_in_any_namespace_unless_several_fit(tmp_path):
     bag = write_bag(tmp_path / 'bag', MESSAGES[:3], '/rig/encoders')
     with Recording(bag) as recording:
-        assert recording.find('encoders') == recording.find('/rig/encoders') == '/rig/encoders'
+        assert recording.find('encoders') == recording.find('/rig/encoders') == Stream('/rig/encoders', JOINT_STATE)
         with pytest.raises(
             ValueError, match='no topic joint_states of sensor_msgs/msg/JointState; of this type it has: /rig/encoders'
         ):
             recording.find('joint_states')
+
+
+@pytest.mark.parametrize('storage', list(StoragePlugin))
+@pytest.mark.parametrize('first', [0, 1])
+def test_of_a_name_that_carries_several_types_each_is_read_for_what_it_is(tmp_path, storage, first):
+    """As in merged recordings, or where a driver's type was changed; whichever type comes first."""
+    other = 'std_msgs/msg/String'
+    text = bytes(TYPES.serialize_cdr(TYPES.types[other]('none of ours'), other))
+    with BagWriter(tmp_path / 'bag', version=9, storage_plugin=storage) as writer:
+        kinds = sorted((JOINT_STATE, other), reverse=bool(first))
+        connections = {kind: writer.add_connection('/joint_states', kind, typestore=TYPES) for kind in kinds}
+        for log_ns, data in MESSAGES:
+            writer.write(connections[other], log_ns, text)
+            writer.write(connections[JOINT_STATE], log_ns, data)
+    with Recording(tmp_path / 'bag') as recording:
+        assert recording.find('joint_states') == JOINTS
+        assert sum(batch.messages for batch in recording.joints(JOINTS)) == recording.count(JOINTS) == len(MESSAGES)
+        said = ', '.join(f'{kind} ({len(MESSAGES)} messages)' for kind in kinds)
+        assert recording.notes == [f'{tmp_path / "bag"}: /joint_states carries messages of several types: {said}']
+        assert mend(recording, tmp_path / 'mended') == 2 * len(MESSAGES)
+    with Reader(tmp_path / 'mended') as reader:
+        kept = [connection.msgtype for connection, _, _ in reader.messages()]
+    assert {kind: kept.count(kind) for kind in kinds} == dict.fromkeys(kinds, len(MESSAGES))
+
+
+def test_a_topic_of_the_right_name_and_another_type_is_told(tmp_path):
+    with BagWriter(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        writer.write(writer.add_connection('/rig/joint_states', 'std_msgs/msg/String', typestore=TYPES), 1, b'')
+    with (
+        Recording(tmp_path / 'bag') as recording,
+        pytest.raises(ValueError, match=r'of this type it has: none; its /rig/joint_states is of std_msgs/msg/String$'),
+    ):
+        recording.find('joint_states')
 
 
 def test_names_that_would_break_a_line_or_command_a_terminal_are_escaped(tmp_path):
@@ -544,9 +580,9 @@ def test_two_suites_are_told_apart_by_their_namespace(tmp_path):
     with Recording(tmp_path / 'bag') as recording:
         with pytest.raises(ValueError, match='choose one with --namespace / or /rig_1 or /rig_2'):
             recording.find('joint_states')
-        assert recording.find('joint_states', namespace='/') == '/joint_states'
+        assert recording.find('joint_states', namespace='/') == JOINTS
         for space in ('rig_2', '/rig_2', '/rig_2/'):
-            assert recording.find('joint_states', namespace=space) == '/rig_2/joint_states'
+            assert recording.find('joint_states', namespace=space).name == '/rig_2/joint_states'
         with pytest.raises(ValueError, match='no topic joint_states of sensor_msgs/msg/JointState in rig_3'):
             recording.find('joint_states', namespace='rig_3')
 
@@ -564,7 +600,7 @@ def test_rows_of_sqlite_without_a_possible_time_cost_themselves_alone(tmp_path, 
         connection.execute('ALTER TABLE loose RENAME TO messages')
         connection.execute(f'UPDATE messages SET timestamp = {time} WHERE rowid = 7')
     with Recording(bag) as recording:
-        times = [message.log_ns for message in recording.messages(['/joint_states'])]
+        times = [message.log_ns for message in recording.messages([JOINTS])]
         assert times == [10**18 + k * 10**7 for k in range(20) if k != 6]
         assert recording.damage
 
