@@ -8,14 +8,14 @@ from dcdrw.recordings.bag_file import Message, Stream
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.joint_recording import serializers
 from dcdrw.recordings.leg_recording import find_topic, leg_readings, leg_topics, namespace_of, wheel_batches
-from dcdrw.recordings.pose_recording import pose_batches, pose_topics
+from dcdrw.recordings.pose_recording import pose_batches
+from dcdrw.recordings.pose_sources import pose_sources, what_poses
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.parameter_file import read_parameter_file
 from dcdrw_control.legs.params import LegParams
 from dcdrw_control.legs.walk import leg_updates
 from dcdrw_msgs_py.samples import JointSample, Turn
-from dcdrw_msgs_py.text_file import one_line
-from dcdrw_msgs_py.topics import FRONT_POSE, JOINT_STATES, REAR_POSE
+from dcdrw_msgs_py.topics import JOINT_STATES
 from dcdrw_tracker.gait.phase import PhaseParams
 
 
@@ -54,9 +54,9 @@ def derived_joints(
     """
     if topic != JOINT_STATES.name or find_topic(recording, JOINT_STATES, namespace):
         return None
-    poses = pose_topics(recording, namespace)
+    poses = pose_sources(recording, namespace)
     if poses:
-        return poses[0].name.removesuffix(FRONT_POSE.name) + topic, pose_batches(recording, rig, namespace, window)
+        return f'{poses.namespace}/{topic}', pose_batches(recording, poses, rig, window)
     params, legs = recorded_walk(recording, rig, namespace)
     if not legs:
         return None
@@ -72,25 +72,12 @@ def joint_topic(recording: Recording, topic: str, namespace: str = '') -> Stream
         ValueError: there is none, or one in several namespaces; what poses were recorded in its place is told.
 
     """
-    poses = [f'{one_line(found.name)} ({found.type})' for kind in _POSES for found in recording.of_type(kind)]
     try:
         return recording.find(topic, namespace=namespace)
     except ValueError as error:
-        if not poses or recording.found(topic, namespace=namespace):
+        if recording.found(topic, namespace=namespace) or not (poses := what_poses(recording)):
             raise
-        raise ValueError(
-            f'{error}; poses of the wheels would do, as {FRONT_POSE.name} and {REAR_POSE.name} of {FRONT_POSE.type}: '
-            f'it has {", ".join(poses)}'
-        ) from None
-
-
-_POSES = {
-    FRONT_POSE.type,
-    *(f'geometry_msgs/msg/{kind}' for kind in ('Pose', 'PoseWithCovarianceStamped', 'TransformStamped')),
-    'nav_msgs/msg/Odometry',
-    'tf2_msgs/msg/TFMessage',
-}
-"""Types of messages that tell where a body is."""
+        raise ValueError(f'{error}; {poses}') from None
 
 
 def _of_both(batches: Iterator[JointBatch], recording: Recording, legs: list[Stream]) -> Iterator[JointBatch]:

@@ -7,14 +7,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dcdrw.recordings.bag_file import Stream
 from dcdrw.recordings.joint_batch import JointBatch
-from dcdrw.recordings.leg_recording import find_topic
+from dcdrw.recordings.pose_sources import PoseSources, poses_of
 from dcdrw.recordings.recording import BATCH, Recording
 from dcdrw.suite.parameter_file import read_parameter_file
 from dcdrw_msgs_py.rig import FRONT, REAR
-from dcdrw_msgs_py.samples import SECOND, JointSample, PoseSample
-from dcdrw_msgs_py.topics import FRONT_POSE, FRONT_WHEEL, REAR_POSE, REAR_WHEEL
+from dcdrw_msgs_py.samples import JointSample
+from dcdrw_msgs_py.text_file import one_line
+from dcdrw_msgs_py.topics import FRONT_WHEEL, REAR_WHEEL
 from dcdrw_tracker.wheels.poses import PosePairs, PoseParams
 from dcdrw_tracker.wheels.wheel_angles import WheelAngles
 from dcdrw_tracker.wheels.wheel_track import TrackParams
@@ -27,21 +27,15 @@ class PoseTracking(NamedTuple):
     bodies: PoseParams = PoseParams()
 
 
-def pose_topics(recording: Recording, namespace: str = '') -> list[Stream]:
-    """The topics of both wheels' poses, the front one's first; none unless both were recorded."""
-    found = [one for topic in (FRONT_POSE, REAR_POSE) if (one := find_topic(recording, topic, namespace))]
-    return found if len(found) == 2 else []
-
-
 def pose_batches(
-    recording: Recording, rig: Path | None = None, namespace: str = '', window: tuple[int, ...] = ()
+    recording: Recording, sources: PoseSources, rig: Path | None = None, window: tuple[int, ...] = ()
 ) -> Iterator[JointBatch]:
     """What the tag tracker makes of the poses, and those of no use, as messages that cannot be read.
 
     Args:
-        recording: an open recording that has `pose_topics`.
+        recording: an open recording.
+        sources: what of it tells the poses.
         rig: a parameter file; it takes the place of what was recorded.
-        namespace: of the poses, where the recording has several.
         window: from when to before when they were recorded [ns].
 
     Raises:
@@ -49,10 +43,9 @@ def pose_batches(
 
     """
     params = PoseTracking()
-    topics = pose_topics(recording, namespace)
     for file in filter(None, (recording.parameters, rig)):
-        params = read_parameter_file(file, params, topics[0].name.removesuffix(FRONT_POSE.name))
-    for kind, group in groupby(_followed(recording, params, topics, window), _kind):
+        params = read_parameter_file(file, params, sources.namespace)
+    for kind, group in groupby(_followed(recording, params, sources, window), _kind):
         while part := list(islice(group, BATCH)):
             yield _unread(kind, len(part)) if isinstance(kind, str) else _joints(part, kind)
 
@@ -63,25 +56,25 @@ def _kind(found: JointSample | str) -> int | str:
 
 
 def _followed(
-    recording: Recording, params: PoseTracking, topics: list[Stream], window: tuple[int, ...]
+    recording: Recording, params: PoseTracking, sources: PoseSources, window: tuple[int, ...]
 ) -> Iterator[JointSample | str]:
     """Joint states, and in the place of poses that are of no use why."""
     pairs, angles = PosePairs(params.bodies, params.track.slope), WheelAngles(params.track)
-    wheels = dict(zip(topics, (FRONT, REAR), strict=True))
-    for topic, _, message in recording.decoded(topics, *window):
-        try:
-            views = pairs.take(wheels[topic], _pose(message))
-        except ValueError as error:
-            yield f'{topic.name}: {error}'
-            continue
-        yield from filter(None, map(angles.update, views))
-
-
-def _pose(message: Any) -> PoseSample:
-    stamp, place, turn = message.header.stamp, message.pose.position, message.pose.orientation
-    return PoseSample(
-        int(stamp.sec) * SECOND + int(stamp.nanosec), (place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)
-    )
+    wheels = {FRONT: sources.front, REAR: sources.rear}
+    parents: dict[str, str] = {}
+    for topic, _, message in recording.decoded(list({body.topic for body in wheels.values()}), *window):
+        for wheel, body in wheels.items():
+            for parent, pose in poses_of(body, message) if body.topic == topic else ():
+                parents[wheel] = parent
+                try:
+                    if body.frame and len(set(parents.values())) > 1:
+                        frames = one_line(' and '.join(parents.values()))
+                        raise ValueError(f'both wheels must be told in one frame, got {frames}')
+                    views = pairs.take(wheel, pose)
+                except ValueError as error:
+                    yield f'{one_line(body.frame or topic.name)}: {error}'
+                    continue
+                yield from filter(None, map(angles.update, views))
 
 
 def _joints(samples: list[Any], run: int) -> JointBatch:

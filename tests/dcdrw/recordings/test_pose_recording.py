@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 
@@ -106,28 +107,83 @@ def test_of_the_poses_of_two_rigs_those_asked_for_are_judged(tmp_path, capsys):
     assert read_trial(bag, rig=rig, namespace='rig_2')[0].params.sync.band_percent == 8.0
 
 
+def told(kind, pose, child='', parent='room'):
+    """A message of a type that tells a pose, and of a body aside where it can."""
+
+    def make(name, *values):
+        return TYPES.types[name](*values)
+
+    (x, y, z), turn = pose.position, make('geometry_msgs/msg/Quaternion', *pose.orientation)
+    header = make('std_msgs/msg/Header', make('builtin_interfaces/msg/Time', *divmod(pose.stamp_ns, 10**9)), parent)
+    placed = make('geometry_msgs/msg/Pose', make('geometry_msgs/msg/Point', x, y, z), turn)
+    transform = make('geometry_msgs/msg/Transform', make('geometry_msgs/msg/Vector3', x, y, z), turn)
+    uncertain = make('geometry_msgs/msg/PoseWithCovariance', placed, np.zeros(36))
+    vector = make('geometry_msgs/msg/Vector3', 0.0, 0.0, 0.0)
+    still = make('geometry_msgs/msg/TwistWithCovariance', make('geometry_msgs/msg/Twist', vector, vector), np.zeros(36))
+    moved = make('geometry_msgs/msg/TransformStamped', header, child, transform)
+    aside = make('geometry_msgs/msg/TransformStamped', header, 'camera', transform)
+    return {
+        FRONT_POSE.type: lambda: make(kind, header, placed),
+        'geometry_msgs/msg/PoseWithCovarianceStamped': lambda: make(kind, header, uncertain),
+        'nav_msgs/msg/Odometry': lambda: make(kind, header, child, uncertain, still),
+        'geometry_msgs/msg/TransformStamped': lambda: moved,
+        'tf2_msgs/msg/TFMessage': lambda: make(kind, [aside, moved]),
+    }[kind]()
+
+
+def bag_of(path, poses, kind, topics, frames=('', ''), parents=('room', 'room')):
+    """A recording of poses in messages of a type."""
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connections = {name: writer.add_connection(name, kind, typestore=TYPES) for name in dict.fromkeys(topics)}
+        for wheel, pose in poses:
+            k = wheel == 'rear'
+            message = bytes(TYPES.serialize_cdr(told(kind, pose, frames[k], parents[k]), kind))
+            writer.write(connections[topics[k]], pose.stamp_ns, message)
+    return path
+
+
+WALK = streams(walk(2.0, 120.0))
+
+
 @pytest.mark.parametrize(
-    'types',
+    ('kind', 'topics', 'frames'),
     [
-        ['geometry_msgs/msg/PoseWithCovarianceStamped'] * 2,
-        ['nav_msgs/msg/Odometry'] * 2,
-        ['geometry_msgs/msg/TransformStamped'] * 2,
-        ['tf2_msgs/msg/TFMessage'],
-        [FRONT_POSE.type],
+        (FRONT_POSE.type, ('/vrpn/front/pose', '/vrpn/rear/pose'), ('', '')),
+        ('geometry_msgs/msg/PoseWithCovarianceStamped', ('front_pose', 'rear_pose'), ('', '')),
+        ('nav_msgs/msg/Odometry', ('/front_wheel/odom', '/rear_wheel/odom'), ('a', 'b')),
+        ('geometry_msgs/msg/TransformStamped', ('/mocap/front_pose', '/mocap/rear_pose'), ('a', 'b')),
+        ('geometry_msgs/msg/TransformStamped', ('/bodies', '/bodies'), ('lab/front_wheel', 'lab/rear_wheel')),
+        ('tf2_msgs/msg/TFMessage', ('/tf', '/tf'), ('front_wheel', 'rear_wheel')),
     ],
 )
-def test_of_poses_that_are_not_taken_it_is_told_how_they_would_be(types, tmp_path, capsys):
-    topics = ('/mocap/front', '/mocap/rear')
-    with Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        for topic, kind in zip(topics, types, strict=False):
-            writer.write(writer.add_connection(topic, kind, typestore=TYPES), START_NS, b'\0\1\0\0')
-    told = ', '.join(f'{topic} ({kind})' for topic, kind in zip(topics, types, strict=False))
+def test_poses_tell_the_same_in_whatever_message_they_come(tmp_path, kind, topics, frames):
+    motion = read_trial(bag_of(tmp_path / 'bag', WALK, kind, topics, frames))[0].motion
+    reference = read_trial(pose_bag(tmp_path / 'reference', WALK))[0].motion
+    assert len(motion.phi) == len(reference.phi) > 200
+    assert (motion.phi == reference.phi).all()
+
+
+def test_wheels_in_different_frames_of_a_tree_are_told(tmp_path, capsys):
+    bag = bag_of(
+        tmp_path / 'bag', WALK, 'tf2_msgs/msg/TFMessage', ('/tf', '/tf'), ('front_wheel', 'rear_wheel'), ('room', 'map')
+    )
+    assert main(['analyze', str(bag)]) == 2
+    assert 'both wheels must be told in one frame, got room and map' in capsys.readouterr().err
+
+
+def test_of_poses_that_are_none_of_the_wheels_it_is_told_how_they_would_be(tmp_path, capsys):
+    bodies = ('tf2_msgs/msg/TFMessage', ('/tf', '/tf'), ('base_link', 'arm'))
+    bag = bag_of(tmp_path / 'tree', WALK[:8], *bodies)
     for command in ('analyze', 'replay'):
-        assert main([command, str(tmp_path / 'bag')]) == 2
+        assert main([command, str(bag)]) == 2
         assert capsys.readouterr().err.endswith(
-            'of this type it has: none; poses of the wheels would do, as front_pose and rear_pose of '
-            f'geometry_msgs/msg/PoseStamped: it has {told}\n'
+            'of this type it has: none; poses of the wheels would do, in topics front_pose and rear_pose of '
+            'geometry_msgs/msg/PoseStamped, say, or as frames front_wheel and rear_wheel: it has /tf '
+            '(tf2_msgs/msg/TFMessage, camera, base_link, arm)\n'
         )
+    alone = bag_of(tmp_path / 'alone', WALK[:8], FRONT_POSE.type, ('/front_pose', '/front_pose'))
+    assert main(['analyze', str(alone)]) == 2
+    assert capsys.readouterr().err.endswith('it has /front_pose (geometry_msgs/msg/PoseStamped)\n')
 
 
 def test_of_joint_states_in_several_suites_poses_tell_nothing(tmp_path, capsys):
