@@ -59,7 +59,7 @@ def _followed(
     recording: Recording, params: PoseTracking, sources: PoseSources, window: tuple[int, ...]
 ) -> Iterator[JointSample | str]:
     """Joint states, and in the place of poses that are of no use why."""
-    pairs, angles = PosePairs(params.bodies, params.track.slope), WheelAngles(params.track)
+    pairs, angles = PosePairs(params.bodies, params.track), WheelAngles(params.track)
     wheels = {FRONT: sources.front, REAR: sources.rear}
     parents: dict[str, str] = {}
     for topic, _, message in recording.decoded(list({body.topic for body in wheels.values()}), *window):
@@ -75,6 +75,8 @@ def _followed(
                     yield f'{one_line(body.frame or topic.name)}: {error}'
                     continue
                 yield from filter(None, map(angles.update, views))
+    if pairs.waits:
+        yield pairs.waits
 
 
 def _joints(samples: list[Any], run: int) -> JointBatch:

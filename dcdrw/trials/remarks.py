@@ -11,7 +11,7 @@ from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.words import by_count, counted
-from dcdrw_tracker.gait.diagnostics import HINTS, REFUSALS, coarseness
+from dcdrw_tracker.gait.diagnostics import REFUSALS, coarseness, hints_in_words
 from dcdrw_tracker.gait.phase import Restart
 
 MANY_DISBELIEVED = 0.1
@@ -34,8 +34,8 @@ def remarks(trial: Analysis) -> tuple[Remark, ...]:
 
 def _remarks(trial: Analysis) -> Iterator[Remark]:
     estimator, cadence = trial.estimator, trial.cadence
-    for hint in estimator.hints:
-        yield Remark(_as_sentence(HINTS[hint]), True)
+    for hint in hints_in_words(estimator.hints):
+        yield Remark(_as_sentence(hint), True)
     if trial.status.too_coarse:
         yield Remark(_as_sentence(coarseness(trial.status)), True)
     shift = 100.0 * abs(trial.wheels_apart) * trial.status.steps / trial.seconds if trial.seconds > 0.0 else 0.0

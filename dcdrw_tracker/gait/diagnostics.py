@@ -1,6 +1,7 @@
 """Diagnoses: what snapshots of the cores mean to a person. Pure functions; `/diagnostics` carries the result."""
 
 import math
+from collections.abc import Iterable
 
 from dcdrw_msgs_py.diagnosis import (
     AGE,
@@ -142,13 +143,25 @@ def _judge_phase(status: PhaseStatus, age: float, stale_after: float) -> tuple[L
             return Level.STALE, f'every sample is refused: {REFUSALS[status.refusal]}'
         return Level.STALE, _no_sample(age)
     if status.hints:
-        return Level.WARN, '; '.join(HINTS[hint] for hint in status.hints)
+        return Level.WARN, '; '.join(hints_in_words(status.hints))
     if status.n_uncertain:
         return Level.WARN, f'n may be off: a gap of up to {status.cadence.longest:.2f} s may hide a step'
     return Level.OK, 'tracking both wheels'
 
 
-HINTS: dict[Hint, str] = {
+def hints_in_words(hints: Iterable[Hint]) -> list[str]:
+    """What makes parameters seem wrong."""
+    found = dict.fromkeys(hints)
+    if {'front_sign', 'rear_sign'} <= found.keys():
+        return [_BOTH_UPHILL, *(_HINTS[hint] for hint in found if hint not in ('front_sign', 'rear_sign'))]
+    return [_HINTS[hint] for hint in found]
+
+
+_BOTH_UPHILL = (
+    'both wheels roll uphill: are their signs right? (parameters front_sign and rear_sign; of poses, heading_deg, and '
+    'which of them is front)'
+)
+_HINTS: dict[Hint, str] = {
     'front_sign': 'the front wheel rolls uphill: is its sign right? (parameter front_sign)',
     'rear_sign': 'the rear wheel rolls uphill: is its sign right? (parameter rear_sign)',
     'ratio': 'one wheel takes more steps than the other: are the gear ratios of both encoders right, and the spokes? '
@@ -160,7 +173,6 @@ HINTS: dict[Hint, str] = {
     'revolutions': 'the wheels turn slower than they can roll: are their rotations in revolutions? (parameter unit)',
     'unit': 'the wheels turn faster than they can roll: are their rotations in degrees? (parameter unit)',
 }
-"""What makes a parameter seem wrong."""
 REFUSALS: dict[Refusal, str] = {
     'unreadable': 'a wheel is missing, or the message is malformed (see the parameters front_joint and rear_joint)',
     'unpaired': "each wheel comes in messages of its own, and the rear one's stay away",

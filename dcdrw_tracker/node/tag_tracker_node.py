@@ -84,7 +84,7 @@ class TagTrackerNode(Node):
         self._worker: Thread | None = None
         if self._source.source == POSES:
             self._angles = WheelAngles(self._track.value, first_run)
-            self._pairs = PosePairs(self._bodies, self._track.value.slope)
+            self._pairs = PosePairs(self._bodies, self._track.value)
             self._topics = (FRONT_POSE, REAR_POSE)
             listen(self, FRONT_POSE, partial(self._on_pose, FRONT))
             listen(self, REAR_POSE, partial(self._on_pose, REAR))
@@ -234,7 +234,7 @@ class TagTrackerNode(Node):
         track = self._track.value
         if self._source.source == POSES:
             self._angles.configure(track)
-            self._pairs = PosePairs(self._bodies, track.slope)
+            self._pairs = PosePairs(self._bodies, track)
         else:
             self._tracker.configure(self._view.value, track)
 
@@ -276,7 +276,7 @@ class TagTrackerNode(Node):
             return self._reader.state
         if self._source.source == POSES:
             if self._pairs.waits:
-                return 'waiting for a wheel to turn by 10°, which shows whether the axes are as told'
+                return self._pairs.waits
             names = ' and '.join(self.resolve_topic_name(topic.name) for topic in (FRONT_POSE, REAR_POSE))
             return f'no poses of both wheels come on {names}'
         name = self._subscription.topic_name

@@ -11,6 +11,7 @@ from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import PoseSample
 from dcdrw_msgs_py.values import Floats
 from dcdrw_tracker.tags.wheel_view import PairView, WheelView
+from dcdrw_tracker.wheels.wheel_track import TrackParams
 
 AXES = 'xyz'
 LONGEST_PAUSE_NS = 100_000_000
@@ -29,6 +30,8 @@ MOST_WAITING = 600
 """Views that are kept until a wheel has turned."""
 LEAST_LEVER = 0.5
 """A body's axis must lie at least so far in the plane of its wheel, as a share of its length."""
+LEAST_TRAVEL = 0.5
+"""A hub that goes at least so far, as a share of what its wheel rolls, and the other way, is none that rolls."""
 
 OffsetDeg = Annotated[
     float, Quantity("ψ of the wheel while that axis of its body lies along the slope's normal", 'deg')
@@ -88,12 +91,15 @@ class PosePairs:
 
     """
 
-    def __init__(self, params: PoseParams, slope: float) -> None:
+    def __init__(self, params: PoseParams, track: TrackParams) -> None:
         params.check_axis()
         self._axis = AXES.index(params.spoke_axis)
         self._offsets = {FRONT: math.radians(params.front_offset_deg), REAR: math.radians(params.rear_offset_deg)}
-        self._slope = slope
-        self._basis = None if math.isnan(params.heading_deg) else _basis(math.radians(params.heading_deg), slope)
+        self._track = track
+        self._lengths = {FRONT: track.front.length, REAR: track.rear.length}
+        self._path: dict[str, deque[_Seen]] = {wheel: deque(maxlen=RECENT) for wheel in self._lengths}
+        """Where each wheel was until it is known how the axes lie; rotations without jumps."""
+        self._basis = None if math.isnan(params.heading_deg) else _basis(math.radians(params.heading_deg), track.slope)
         self._first: dict[str, PoseSample] = {}
         self._front: deque[_Seen] = deque()
         self._rear: deque[_Seen] = deque()
@@ -105,9 +111,15 @@ class PosePairs:
         self._waiting: deque[PairView] | None = deque(maxlen=MOST_WAITING)
 
     @property
-    def waits(self) -> bool:
-        """Whether views are held back until a wheel has turned."""
-        return bool(self._waiting)
+    def waits(self) -> str:
+        """Why views are held back; empty where none are."""
+        if not self._waiting:
+            return ''
+        text = f'no wheel has turned by {math.degrees(TURNED):g}°, which shows whether the axes are as told'
+        for wheel, length in self._lengths.items():
+            if (gone := self._gone(wheel)) > length:
+                text += f'; the hub of the {wheel} wheel has gone {gone:.1f} m without: is its orientation tracked?'
+        return text
 
     def take(self, wheel: str, pose: PoseSample) -> list[PairView]:
         """Take the next pose of a wheel, `front` or `rear`; returns the views that it completes, in order.
@@ -120,8 +132,13 @@ class PosePairs:
             raise ValueError('the stamps are zero: without their time poses tell no motion; let the source stamp them')
         if not all(map(math.isfinite, (*pose.position, *pose.orientation))):
             raise ValueError('position or orientation is not a number')
-        if not abs(math.hypot(*pose.orientation) - 1.0) < 0.01:
-            raise ValueError(f'the orientation {pose.orientation} is not a unit quaternion')
+        size = math.hypot(*pose.orientation)
+        if not abs(size - 1.0) < 0.01:
+            raise ValueError(
+                f'the orientation is not a unit quaternion: its length is {size:.3g}; let the source normalize it'
+                if size
+                else 'the orientation is all zeros, as where nothing tells it or the body is hidden'
+            )
         if not any(pose.position) and not any(pose.orientation[:3]):
             raise ValueError(f'the {wheel} wheel is at the origin, unturned: a default pose, sent while it is hidden')
         latest = self._latest.get(wheel)
@@ -138,6 +155,10 @@ class PosePairs:
             return []
         seen = self._seen(wheel, pose, self._basis)
         self._check_height(wheel, seen.hub[1])
+        if self._waiting is not None:
+            before = self._path[wheel][-1].rotation if self._path[wheel] else seen.rotation
+            unwrapped = before + math.remainder(seen.rotation - before, math.tau)
+            self._path[wheel].append(seen._replace(rotation=unwrapped))
         queue = self._front if wheel == FRONT else self._rear
         if queue and seen.stamp_ns <= queue[-1].stamp_ns:
             queue.clear()  # the stream has started anew
@@ -150,7 +171,8 @@ class PosePairs:
         if abs(height - self._level) > OFF_SLOPE:
             raise ValueError(
                 f'the hub of the {wheel} wheel is {abs(height - self._level):.1f} m off the line on which hubs travel: '
-                'it is hidden or carried, slope and up_axis are not those of the room, or the positions are not in m'
+                'it is hidden or carried, front and rear are swapped, slope, heading_deg or up_axis are not those of '
+                'the room, or the positions are not in m'
             )
         self._heights.append(height)
         if len(self._heights) >= FEW and (math.isnan(self._level) or len(self._heights) < RECENT):
@@ -173,17 +195,38 @@ class PosePairs:
                     f'the wheels turn about the axis that should point up, {up}; is {other} up? set up_axis to {other}'
                 )
             raise ValueError(
-                f'the {wheel} wheel does not turn about an axis across downhill: see heading_deg and up_axis'
+                f'the {wheel} wheel does not turn about an axis across downhill: see heading_deg and up_axis, '
+                'and whether the components of orientations are in the order x, y, z, w'
             )
+        self._check_roll(wheel)
         views = list(self._waiting)
         self._waiting = None
         return views
+
+    def _check_roll(self, wheel: str) -> None:
+        """Refuse a wheel that turns against the way that its hub goes."""
+        first, last = self._path[wheel][0], self._path[wheel][-1]
+        turned, gone = last.rotation - first.rotation, last.hub[0] - first.hub[0]
+        least = LEAST_TRAVEL * self._lengths[wheel] * abs(turned)
+        if not self._track.camera_follows and turned * gone < 0.0 and abs(gone) > least and abs(turned) > TURNED / 2:
+            if self._waiting:
+                self._waiting.clear()
+            raise ValueError(
+                f'the {wheel} wheel turns against the way that its hub goes: are the components of its orientation in '
+                'the order x, y, z, w, and not those of the inverse? (a treadmill: set camera_follows)'
+            )
+
+    def _gone(self, wheel: str) -> float:
+        """How far the hub is along the slope from where it was first seen [m]."""
+        if self._basis is None or not self._path[wheel] or wheel not in self._first:
+            return 0.0
+        return abs(float(self._path[wheel][-1].hub[0] - self._basis[0] @ np.array(self._first[wheel].position)))
 
     def _find_heading(self, wheel: str, pose: PoseSample) -> None:
         self._first.setdefault(wheel, pose)
         if len(self._first) == 2:
             front, rear = (self._first[name].position for name in (FRONT, REAR))
-            self._basis = _basis(math.atan2(front[1] - rear[1], front[0] - rear[0]), self._slope)
+            self._basis = _basis(math.atan2(front[1] - rear[1], front[0] - rear[0]), self._track.slope)
 
     def _seen(self, wheel: str, pose: PoseSample, basis: Floats) -> _Seen:
         """ψ is the angle of the spoke's axis from the slope's normal towards downhill."""

@@ -42,7 +42,7 @@ def streams(truth, delay_ns=0, **placed):
 
 
 def paired(poses, params=PoseParams()) -> list[PairView]:  # noqa: B008
-    pairs = PosePairs(params, SLOPE)
+    pairs = PosePairs(params, TrackParams())
     return [view for wheel, pose in poses for view in pairs.take(wheel, pose)]
 
 
@@ -124,25 +124,26 @@ def test_a_stream_that_starts_anew_goes_on():
     [
         (PoseSample(0, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), 'the stamps are zero: without their time'),
         (PoseSample(9, (math.nan, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), 'is not a number'),
-        (PoseSample(9, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)), 'is not a unit quaternion'),
+        (PoseSample(9, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)), 'all zeros, as where nothing tells it'),
+        (PoseSample(9, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.5)), 'is not a unit quaternion: its length is 1.5; let'),
         (PoseSample(9, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), 'at the origin, unturned: a default pose'),
     ],
 )
 def test_what_is_no_pose_is_told(pose, message):
     with pytest.raises(ValueError, match=message):
-        PosePairs(PoseParams(), SLOPE).take(FRONT, pose)
+        PosePairs(PoseParams(), TrackParams()).take(FRONT, pose)
 
 
 def test_a_wrong_axis_is_told():
     with pytest.raises(ValueError, match=r"the y axis of the \w+ wheel's body lies along its axle: set spoke_axis"):
         paired(streams(walk(1.0)), PoseParams(spoke_axis='y'))
     with pytest.raises(ValueError, match="spoke_axis must be x, y or z, got 'w'"):
-        PosePairs(PoseParams(spoke_axis='w'), SLOPE)
+        PosePairs(PoseParams(spoke_axis='w'), TrackParams())
 
 
 def taken(poses, params=PoseParams()):  # noqa: B008
     """Joint samples, and what was refused with which words."""
-    pairs, angles, samples, refused = PosePairs(params, SLOPE), WheelAngles(TrackParams()), [], []
+    pairs, angles, samples, refused = PosePairs(params, TrackParams()), WheelAngles(TrackParams()), [], []
     for wheel, pose in poses:
         try:
             views = pairs.take(wheel, pose)
@@ -236,8 +237,47 @@ def test_wheels_that_were_held_are_seen_from_the_start():
             (REAR, truth.rear[0], hub(truth.rear[:1])[0]),
         )
     ]
-    pairs = PosePairs(PoseParams(), SLOPE)
+    pairs = PosePairs(PoseParams(), TrackParams())
     assert not [view for wheel, pose in still for view in pairs.take(wheel, pose)]
     assert pairs.waits
     samples, _ = taken(still + streams(truth))
     assert len(samples) > 240 + truth.time.size - 10
+
+
+@pytest.mark.parametrize('heading', [0.0, 0.6])
+@pytest.mark.parametrize(
+    'wrong', [lambda x, y, z, w: (w, x, y, z), lambda x, y, z, w: (-x, -y, -z, w)], ids=['w first', 'inverse']
+)
+def test_orientations_in_another_order_or_inverted_give_no_wrong_sample(heading, wrong):
+    poses = [
+        (wheel, pose._replace(orientation=wrong(*pose.orientation)))
+        for wheel, pose in streams(walk(4.0, 120.0), heading=heading)
+    ]
+    samples, refused = taken(poses)
+    assert samples == []
+    assert any('the order x, y, z, w' in why for why in refused)
+    assert len(refused) > 800
+
+
+def test_on_a_treadmill_a_hub_may_go_back_while_its_wheel_rolls_on():
+    poses = [
+        (wheel, pose._replace(position=(-pose.position[0], *pose.position[1:])))
+        for wheel, pose in streams(walk(4.0, 120.0))
+    ]
+    level, heading = TrackParams(camera_follows=True, slope=0.0), PoseParams(heading_deg=0.0)
+    for track, gives in ((level, True), (level._replace(camera_follows=False), False)):
+        pairs, views = PosePairs(heading, track), 0
+        for wheel, pose in poses:
+            try:
+                views += len(pairs.take(wheel, pose))
+            except ValueError:
+                continue
+        assert bool(views) == gives
+
+
+def test_of_a_hub_that_goes_without_a_turn_it_is_asked_whether_its_orientation_is_tracked():
+    pairs = PosePairs(PoseParams(), TrackParams())
+    for wheel, pose in streams(walk(4.0, 120.0)):
+        assert not pairs.take(wheel, pose._replace(orientation=(0.0, 0.0, 0.0, 1.0)))
+    assert 'the hub of the front wheel has gone' in pairs.waits
+    assert 'is its orientation tracked?' in pairs.waits
