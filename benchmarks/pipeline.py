@@ -7,7 +7,8 @@ holds each figure's median over the rounds, and all losses:
 
 - suite: simulator → phase_estimator → sync_monitor and synchronizer, four processes;
 - one: simulator → estimator, monitor and synchronizer in one process (`suite`);
-- bare: four nodes that only copy a float, with the same messages, as many of them, the same QoS and executor.
+- bare: four nodes that only copy a float, with the same messages, as many of them, the same QoS and executor, taken and
+  published as rclpy does.
 
 The synchronizer is enabled, and pushes by the law `hold`. Latency runs from the stamp of `joint_states` to the arrival
 in this process of `sync_error`, and of the first `coupler_wrench` that knows of it; the latter waits for the next of
@@ -30,6 +31,7 @@ import numpy as np
 import rclpy
 from geometry_msgs.msg import WrenchStamped
 from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Int32
 
@@ -73,7 +75,7 @@ class BareNode(Node):
         super().__init__(f'bare_{role}')
         if role == 'source':
             self._writer, self._joints = JointSampleWriter(), self._send_on(JOINT_STATES)
-            listen(self, COUPLER_FORCE_COMMAND, lambda message: None)
+            self._hear(COUPLER_FORCE_COMMAND, lambda message: None)
             timer = self.create_timer(1.0 / rate, self._send, clock=steady_clock())
             self._period_ns = round(SECOND / rate)
             # As the simulator does: a sample is stamped with the time at which it was due.
@@ -81,19 +83,23 @@ class BareNode(Node):
         elif role == 'estimator':
             self._message = PhaseSampleWriter()._message
             self._outputs = [self._send_on(topic) for topic in (PHASE_STATE, PHI, STEP_DIFFERENCE)]
-            listen(self, JOINT_STATES, self._estimate)
+            self._hear(JOINT_STATES, self._estimate)
         elif role == 'monitor':
             self._state = JointState(name=['phase', 'sync_error'], position=[0.0, 0.0], velocity=[0.0, 0.0])
             self._outputs = [self._send_on(topic) for topic in (SYNC_STATE, SYNC_ERROR, SYNC_ERROR_PERCENT)]
-            listen(self, PHASE_STATE, self._monitor)
+            self._hear(PHASE_STATE, self._monitor)
         else:
             self._wrench = WrenchStamped()
             self._outputs = [self._send_on(topic) for topic in (COUPLER_FORCE_COMMAND, COUPLER_WRENCH)]
-            listen(self, PHASE_STATE, self._keep)
+            self._hear(PHASE_STATE, self._keep)
             self.create_timer(1.0 / SynchronizerParams().rate, self._command, clock=steady_clock())
 
     def _send_on(self, topic: Topic) -> Any:
         return self.create_publisher(message_type(topic), topic.name, topic.depth)
+
+    def _hear(self, topic: Topic, callback: Callable[[Any], None]) -> None:
+        qos = QoSProfile(depth=topic.depth, reliability=ReliabilityPolicy.BEST_EFFORT)
+        self.create_subscription(message_type(topic), topic.name, callback, qos)
 
     def _send(self) -> None:
         late = self.get_clock().now().nanoseconds - self._due_ns

@@ -7,9 +7,9 @@ from typing import Any
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import PointStamped, WrenchStamped
+from geometry_msgs.msg import PointStamped
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64, Header, Int32
+from std_msgs.msg import Header
 
 from dcdrw_msgs_py.diagnosis import Diagnosis, Level, value_text
 from dcdrw_msgs_py.rig import FRONT, REAR
@@ -224,30 +224,6 @@ class PhaseSampleWriter:
         longer.position = message.position + array('d', (sources, resolution))
         longer.velocity = message.velocity + array('d', (0.0, 0.0))
         return longer
-
-
-class WrenchWriter:
-    """Writes a force and a torque into one message, which is used again and again."""
-
-    def __init__(self) -> None:
-        self._message = WrenchStamped()
-
-    def write(self, stamp: int, force: float, torque: float = 0.0) -> Any:
-        """The message of a force along x [N] and a torque about y [N·m] at a time [ns]; valid until the next call."""
-        message = self._message
-        message.header.stamp = to_stamp(stamp)
-        message.wrench.force.x, message.wrench.torque.y = force, torque
-        return message
-
-
-def float_message(value: float) -> Any:
-    """A number without a stamp."""
-    return Float64(data=value)
-
-
-def integer_message(value: int) -> Any:
-    """A whole number without a stamp."""
-    return Int32(data=value)
 
 
 def run_message(stamp: int, number: int) -> Any:

@@ -24,7 +24,9 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import JointState
 
 from dcdrw_msgs_py.diagnosis import LOST_SAMPLES, Diagnosis, Level, lost_since
 from dcdrw_msgs_py.executor import StreamExecutor
@@ -32,6 +34,7 @@ from dcdrw_msgs_py.messages import diagnostics_message, stamp_ns
 from dcdrw_msgs_py.quantity import Field, build, fields, flatten
 from dcdrw_msgs_py.samples import Runs
 from dcdrw_msgs_py.topics import DIAGNOSTICS, RUNS, SAMPLE_DEPTH, Topic
+from dcdrw_msgs_py.wire import JointStateReader
 
 Params = TypeVar('Params', bound=tuple[Any, ...])
 
@@ -187,16 +190,18 @@ class Outlet:
             callback(self._last)
 
     def publish(self, message: Any) -> None:
-        """Publish a message to all who listen now; a listener of this process must not keep it."""
+        """Publish a message, or its bytes, to all who listen now; a listener of this process must not keep it."""
         if self._latched:
             self._last = message
         if self._is_heard_outside():
             self._publisher.publish(message)
+        if self._by_message and isinstance(message, bytes):
+            message = deserialize_message(message, self._publisher.msg_type)
         for callback in self._by_message:
             callback(message)
 
     def publish_sample(self, sample: Any, write: Callable[[Any], Any]) -> None:
-        """Publish a sample, as a message that `write` makes of it where somebody needs one."""
+        """Publish a sample, as a message, or its bytes, that `write` makes of it where somebody needs one."""
         if self.is_heard:
             self.publish(write(sample))
         for take_sample in self._by_sample:
@@ -248,12 +253,16 @@ class Inbox:
     come, one is passed on every OLD seconds all the same, so that the subscriber does not take its input for silent.
     """
 
-    def __init__(self, callback: Callable[[Any], None], patience: float = OLD) -> None:
-        self._callback, self._patience = callback, patience
+    def __init__(
+        self, callback: Callable[[Any], None], patience: float = OLD, read: Callable[[bytes], Any] | None = None
+    ) -> None:
+        self._callback, self._patience, self._read = callback, patience, read
         self._behind_since, self._oldest = math.inf, 0.0
         self._dropping, self._passed_at = False, 0.0
         self.dropped = 0
         """Messages that were dropped so far."""
+        self.unreadable = 0
+        """Messages whose bytes are none."""
         self.age = 0.0
         """How long the message that is passed on has waited here [s]."""
 
@@ -274,6 +283,12 @@ class Inbox:
         if self._dropping and time.monotonic() - self._passed_at <= OLD:
             self.dropped += 1
             return
+        if self._read:
+            try:
+                message = self._read(message)
+            except RuntimeError:  # of rclpy, which passes over such bytes where it reads them by itself
+                self.unreadable += 1
+                return
         self._callback(message)
         if self._dropping:
             self._passed_at = time.monotonic()
@@ -315,8 +330,10 @@ def listen(
         return node.create_subscription(message_type(topic), topic.name, callback, qos)
     depth = max(topic.depth, depth, BURST_DEPTH if misses_nothing else 0)
     qos = QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
-    inbox = Inbox(callback, BURST_SECONDS if misses_nothing else OLD)
-    return node.create_subscription(message_type(topic), topic.name, inbox.__call__, qos)
+    kind = message_type(topic)
+    read = JointStateReader() if kind is JointState else None
+    inbox = Inbox(callback, BURST_SECONDS if misses_nothing else OLD, read)
+    return node.create_subscription(kind, topic.name, inbox.__call__, qos, raw=bool(read))
 
 
 def listen_aged(
@@ -345,8 +362,13 @@ def follow_runs(node: Node, runs: Runs) -> Any:
 
 def dropped(node: Node) -> dict[str, int]:
     """How many messages of each topic a node has dropped because it could not keep up; only topics that lost some."""
-    inboxes = {one.topic_name: getattr(one.callback, '__self__', None) for one in node.subscriptions}
-    return {name: box.dropped for name, box in inboxes.items() if isinstance(box, Inbox) and box.dropped}
+    return {name: inbox.dropped for name, inbox in _inboxes(node) if inbox.dropped}
+
+
+def _inboxes(node: Node) -> list[tuple[str, Inbox]]:
+    """The inboxes of a node's subscriptions, with their topics."""
+    every = [(one.topic_name, getattr(one.callback, '__self__', None)) for one in node.subscriptions]
+    return [(name, inbox) for name, inbox in every if isinstance(inbox, Inbox)]
 
 
 def publishers(node: Node, topic: Topic) -> list[str]:
@@ -379,7 +401,9 @@ def publish_diagnosis(
         diagnosis, lost = diagnose(), dropped(node)
         before, missing = missing, diagnosis.values.get(LOST_SAMPLES, 0)
         diagnosis = lost_since(diagnosis, before) if warns_of_losses else diagnosis
+        unreadable = {f'unreadable bytes on {name}': box.unreadable for name, box in _inboxes(node) if box.unreadable}
         values = {**diagnosis.values, **{f'messages dropped of {topic}': count for topic, count in lost.items()}}
+        values.update(unreadable)
         level, message = diagnosis.level, diagnosis.message
         if lost != told:
             news = ', '.join(f'{count - told.get(topic, 0)} of {topic}' for topic, count in lost.items())

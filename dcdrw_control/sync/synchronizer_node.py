@@ -13,7 +13,7 @@ from dcdrw_control.sync.diagnosis import diagnose_synchronizer
 from dcdrw_control.sync.safety import State
 from dcdrw_control.sync.synchronizer import Command, Synchronizer, SynchronizerParams
 from dcdrw_msgs_py.diagnosis import Diagnosis
-from dcdrw_msgs_py.messages import PhaseSampleReader, WrenchWriter, float_message
+from dcdrw_msgs_py.messages import PhaseSampleReader
 from dcdrw_msgs_py.node import Parameters, advertise, listen_aged, publish_diagnosis, run, steady_clock
 from dcdrw_msgs_py.samples import PhaseSample
 from dcdrw_msgs_py.topics import (
@@ -24,6 +24,7 @@ from dcdrw_msgs_py.topics import (
     REAR_TORQUE_COMMAND,
     SYNCHRONIZER_STATE,
 )
+from dcdrw_msgs_py.wire import float_bytes, wrench_bytes
 
 SOON = 0.85
 """A sample that comes after so much of the time from command to command is answered at once: less latency, and one
@@ -43,7 +44,7 @@ class SynchronizerNode(Node):
         super().__init__('synchronizer', **kwargs)
         settings = Parameters(self, SynchronizerParams, self._configure, SynchronizerParams.check_law)
         self._core = Synchronizer(settings.value)
-        self._reader, self._writer = PhaseSampleReader(), WrenchWriter()
+        self._reader = PhaseSampleReader()
         self._told: State | None = None
         self._command = Command(0.0, 0.0, State.DISABLED, 0)
         self._last_clock = 0
@@ -97,9 +98,9 @@ class SynchronizerNode(Node):
 
     def _publish(self, command: Command) -> None:
         self._command = command
-        self._effort.publish_sample(command.torque if self._core.drives_hub else command.force, float_message)
+        self._effort.publish_sample(command.torque if self._core.drives_hub else command.force, float_bytes)
         if self._wrench.is_heard:
-            self._wrench.publish(self._writer.write(command.stamp_ns, command.force, command.torque))
+            self._wrench.publish(wrench_bytes(command.stamp_ns, command.force, command.torque))
         if command.state is not self._told:
             self._told = command.state
             self._tell_state()

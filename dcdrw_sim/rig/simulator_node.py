@@ -12,7 +12,7 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from std_srvs.srv import SetBool, Trigger
 
 from dcdrw_msgs_py.diagnosis import STATE, STEP_DIFFERENCE, Diagnosis, Level, SourceState
-from dcdrw_msgs_py.messages import JointSampleWriter, WrenchWriter, run_message, to_stamp
+from dcdrw_msgs_py.messages import JointSampleWriter, run_message, to_stamp
 from dcdrw_msgs_py.node import Age, Parameters, advertise, listen_aged, publish_diagnosis, run, steady_clock
 from dcdrw_msgs_py.rig import FRONT, REAR, RigParams
 from dcdrw_msgs_py.samples import SECOND
@@ -25,6 +25,7 @@ from dcdrw_msgs_py.topics import (
     RUNS,
     Topic,
 )
+from dcdrw_msgs_py.wire import wrench_bytes
 from dcdrw_msgs_py.words import counted
 from dcdrw_sim.motion.ends import MotionError, accept
 from dcdrw_sim.rig.simulator import SimulatedRig, SimulatorParams, Timeline
@@ -63,7 +64,7 @@ class SimulatorNode(Node):
         self._failure = ''
         self._refused_commands = 0
         self._commands = {COUPLER_FORCE_COMMAND: Age(), REAR_TORQUE_COMMAND: Age()}
-        self._writer, self._person_writer = JointSampleWriter(), WrenchWriter()
+        self._writer = JointSampleWriter()
         self._runs = advertise(self, RUNS)
         # Not 1: a simulator that was started anew must not seem to go on with the run of the one before.
         self._run = time.time_ns() // SECOND
@@ -152,7 +153,7 @@ class SimulatorNode(Node):
         if sample:
             self._joint_states.publish(self._writer.write(sample))
             if self._person_force:
-                self._person_force.publish(self._person_writer.write(stamp_ns, -sample.coupler.force))
+                self._person_force.publish(wrench_bytes(stamp_ns, -sample.coupler.force))
         timeline.step(self._paused)
 
     def _configure(self, params: SimulatorParams) -> None:

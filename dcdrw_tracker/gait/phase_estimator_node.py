@@ -9,14 +9,13 @@ from dcdrw_msgs_py.diagnosis import Diagnosis, contested
 from dcdrw_msgs_py.messages import (
     JointSampleReader,
     PhaseSampleWriter,
-    float_message,
     footfall_message,
-    integer_message,
 )
 from dcdrw_msgs_py.node import Age, Parameters, advertise, follow_runs, listen, publish_diagnosis, publishers, run
 from dcdrw_msgs_py.rig import FRONT
 from dcdrw_msgs_py.samples import LoneWheel
 from dcdrw_msgs_py.topics import FOOTFALLS, JOINT_STATES, PHASE_STATE, PHI, STEP_DIFFERENCE
+from dcdrw_msgs_py.wire import float_bytes, integer_bytes
 from dcdrw_tracker.gait.diagnostics import diagnose_phase
 from dcdrw_tracker.gait.pairing import WheelPairs
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams, PhaseUpdate
@@ -85,8 +84,8 @@ class PhaseEstimatorNode(Node):
             if self._sources > 1:
                 phase = phase._replace(sources=self._sources)
             self._phase.publish_sample(phase, self._writer.write)
-        self._phi.publish_sample(update.phase.phi.angle, float_message)
-        self._step_difference.publish_sample(update.phase.step_difference, integer_message)
+        self._phi.publish_sample(update.phase.phi.angle, float_bytes)
+        self._step_difference.publish_sample(update.phase.step_difference, integer_bytes)
         for footfall in update.footfalls:
             self._footfalls[footfall.wheel].publish(footfall_message(footfall))
 

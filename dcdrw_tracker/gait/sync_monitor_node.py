@@ -7,7 +7,7 @@ from rclpy.node import Node
 from std_msgs.msg import Bool
 
 from dcdrw_msgs_py.diagnosis import REFUSED, Diagnosis, Level, PairState, contested
-from dcdrw_msgs_py.messages import PhaseSampleReader, float_message, turns_message
+from dcdrw_msgs_py.messages import PhaseSampleReader, turns_message
 from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, publish_diagnosis, publishers, run, steady_clock
 from dcdrw_msgs_py.samples import PhaseSample, Turn
 from dcdrw_msgs_py.topics import (
@@ -20,6 +20,7 @@ from dcdrw_msgs_py.topics import (
     SYNC_STATE,
     SYNCHRONIZED,
 )
+from dcdrw_msgs_py.wire import float_bytes
 from dcdrw_tracker.gait.diagnostics import diagnose_sync
 from dcdrw_tracker.gait.pair_state import judge
 from dcdrw_tracker.gait.sync import SyncMonitor, SyncParams
@@ -73,8 +74,8 @@ class SyncMonitorNode(Node):
                 SYNC_ERROR_JOINT: Turn(sync.error, phase.phi.rate),
             }
             self._sync_state.publish(turns_message(sync.stamp_ns, turns))
-        self._error.publish_sample(sync.error, float_message)
-        self._error_percent.publish_sample(sync.error_percent, float_message)
+        self._error.publish_sample(sync.error, float_bytes)
+        self._error_percent.publish_sample(sync.error_percent, float_bytes)
         self._tell(sync.synchronized)
 
     def _watch(self) -> None:

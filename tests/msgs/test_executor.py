@@ -7,6 +7,7 @@ from itertools import pairwise
 import pytest
 import rclpy
 from rclpy.context import Context
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64
 from std_srvs.srv import Trigger
 
@@ -25,7 +26,8 @@ from dcdrw_msgs_py.node import (
     share_process,
     steady_clock,
 )
-from dcdrw_msgs_py.topics import DIAGNOSTICS, PHI, SYNCHRONIZED
+from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, PHI, SYNCHRONIZED
+from dcdrw_msgs_py.wire import float_bytes
 from tests.patience import PATIENCE
 
 pytestmark = pytest.mark.processes
@@ -108,6 +110,19 @@ def test_an_exception_of_a_callback_comes_out_of_the_executor(pair):
         pair.until(lambda: False, 'the exception')
 
 
+def test_bytes_that_are_no_message_are_passed_over_and_counted(pair):
+    heard: list[list[str]] = []
+    inbox = listen(pair.hearer, JOINT_STATES, lambda message: heard.append(list(message.name))).callback.__self__
+    publisher = pair.speaker.create_publisher(JointState, 'joint_states', 10)
+    pair.until(publisher.get_subscription_count, 'the subscription')
+    publisher.publish(JointState(name=['wheel'], position=[1.0]))
+    for data in (b'', b'nonsense', b'\0\1\0\0' + b'\xff' * 40):
+        publisher.publish(data)
+    publisher.publish(JointState(name=['wheel'], position=[2.0]))
+    pair.until(lambda: len(heard) == 2, 'both messages')
+    assert inbox.unreadable == 3
+
+
 @pytest.fixture
 def shared(pair, monkeypatch) -> Pair:
     monkeypatch.setattr(nodes, '_outlets', None)
@@ -123,7 +138,7 @@ def test_in_a_shared_process_streams_are_handed_over_and_others_hear_them_over_d
     assert not outlet.is_heard  # nobody needs a message
     outlet.publish_sample(1.0, lambda sample: pytest.fail('a message was made for nobody'))
     listen(shared.hearer, PHI, lambda message: handed.append(message.data))
-    outlet.publish_sample(2.0, lambda sample: Float64(data=sample))
+    outlet.publish_sample(2.0, float_bytes)
     assert (samples, handed) == ([1.0, 2.0], [2.0])
     assert outlet.get_subscription_count() == 0
     outside: list[float] = []
