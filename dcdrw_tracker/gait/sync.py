@@ -168,6 +168,8 @@ class SyncMonitor:
         self._seen_swing = -math.inf, math.inf
         self._fastest = self._last_fastest = 0.0
         self._noise2 = self._watched = 0.0
+        self._stray = 0.0
+        """How far noise, or the counts of coarse encoders, may carry the error from where it is [%]."""
         self._differences = math.nan, math.nan
         self._wild: float | None = None
         self._resolution = 0.0
@@ -321,7 +323,9 @@ class SyncMonitor:
     def _take_error(self, last: PhaseSample, phase: PhaseSample, front: int, rear: int, dt: float) -> None:
         """Hold the error against the band: here, and at the strikes on the way."""
         params, strikes = self.params, self._steps + front
-        self._resolution = round(100.0 * phase.resolution, 6)
+        if phase.resolution or self._resolution:
+            self._resolution = round(100.0 * phase.resolution, 6)
+            self._stray = max(NOISE_SPAN * math.sqrt(self._noise2), self._resolution)
         edge = params.band_percent + ROUNDING
         if self._since <= self._steps:  # a whole step, or more, in the band
             edge += min(params.band_hysteresis_percent, self._stray)
@@ -397,11 +401,6 @@ class SyncMonitor:
             self._swing = min(low, error), max(high, error)
 
     @property
-    def _stray(self) -> float:
-        """How far noise, or the counts of coarse encoders, may carry the error from where it is [%]."""
-        return max(NOISE_SPAN * math.sqrt(self._noise2), self._resolution)
-
-    @property
     def _surprise(self) -> float:
         """How far from where its rates take it an error is wild [%]."""
         return max(SURPRISE, WILD * self._stray)
@@ -418,6 +417,7 @@ class SyncMonitor:
         if noise2 <= SURPRISE * SURPRISE:
             self._watched = min(self._watched + dt, NOISE_MEMORY)
             self._noise2 += (noise2 - self._noise2) * min(dt / self._watched, 1.0)
+            self._stray = max(NOISE_SPAN * math.sqrt(self._noise2), self._resolution)
 
     def _judge(self, foretold: float, is_wild: bool, dt: float, edge: float) -> None:
         """Hold the error against the band: that which its past and rate foretell, drawn as far as noise explains.
