@@ -11,6 +11,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+import yaml
 from catkin_pkg.changelog import get_changelog_from_path
 
 from dcdrw import entry
@@ -76,6 +77,12 @@ def test_versions_and_names_agree():
     assert manifest().findtext('version') == config()['metadata']['version']
     assert manifest().findtext('name') == config()['metadata']['name'] == 'dcdrw'
     assert manifest().get('format') == '3'
+
+
+def test_the_package_leads_to_the_paper_that_is_to_be_cited():
+    (paper,) = yaml.safe_load((ROOT / 'CITATION.cff').read_text())['references']
+    assert manifest().findtext('url') == paper['url']
+    assert paper['url'] in (ROOT / 'docs/paper.md').read_text()
 
 
 def test_each_executable_has_an_entry_point_and_a_script():
