@@ -19,7 +19,7 @@ SELDOM_SECONDS = 0.02
 """While messages and timers keep coming, services and clients are looked at so seldom [s]."""
 RARELY_SECONDS = 0.2
 """And so rarely what else there is: events, of which each publisher and each subscription has several [s]."""
-_STREAM_KINDS = ('subscription', 'timer', 'guard_condition')
+_STREAM_KINDS = ('timer', 'subscription', 'guard_condition')
 _ASKING_KINDS = ('service', 'client')
 
 
@@ -57,6 +57,8 @@ class StreamExecutor(Executor):
     _seldom_due = 0.0
     _rarely_due = 0.0
     _wait_set: Any = None
+    _by_handle: dict[int, Any]
+    """The streams' entities."""
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Wait until something is ready, and run the callbacks of all that is.
@@ -72,30 +74,32 @@ class StreamExecutor(Executor):
         end = math.inf if timeout_sec is None or timeout_sec < 0.0 else time.monotonic() + timeout_sec
         if self._has_changed or self._known != self._nodes:
             self._look_up()
-        streams = self._streams
-        ready, seldom = set[int](), None
+        ready: list[list[int]] = []
+        seldom = None
         if time.monotonic() < self._seldom_due:
-            ready = self._wait(streams, None, min(end, self._seldom_due))
-        if not ready:
+            ready = self._wait(None, min(end, self._seldom_due))
+        if not any(ready):
             asked = False
             if time.monotonic() < self._rarely_due:
                 seldom = self._seldom._replace(waitables=())
-                ready = self._wait(streams, seldom, min(end, self._rarely_due))
+                ready = self._wait(seldom, min(end, self._rarely_due))
                 asked = any(map(self._wait_set.get_ready_entities, _ASKING_KINDS))
-            if not (ready or asked):
+            if not (any(ready) or asked):
                 seldom = self._seldom
-                ready = self._wait(streams, seldom, end)
+                ready = self._wait(seldom, end)
                 self._rarely_due = time.monotonic() + RARELY_SECONDS
             self._seldom_due = time.monotonic() + SELDOM_SECONDS
-        for timer in streams.timers:
-            if timer.handle.pointer in ready and timer.handle.is_timer_ready():
+        timers, subscriptions, guards = ready
+        by_handle = self._by_handle  # what a callback brings or takes is looked up before the next wait
+        for pointer in timers:
+            timer = by_handle[pointer]
+            if timer.handle.is_timer_ready():
                 timer.handle.call_timer()
                 timer.callback()
-        for subscription in streams.subscriptions:
-            if subscription.handle.pointer in ready:
-                self._read(subscription)
-        for guard in streams.guards:
-            if guard.handle.pointer in ready:
+        for pointer in subscriptions:
+            self._read(by_handle[pointer])
+        for pointer in guards:
+            if guard := by_handle.get(pointer):  # else one of the executor's own, which have only ended the wait
                 self._handle(guard, self._take_guard_condition)
         if seldom:
             self._see_to(seldom)
@@ -114,6 +118,7 @@ class StreamExecutor(Executor):
         """Find what there is to wait for."""
         self._has_changed, self._known = False, set(self._nodes)
         self._streams, self._seldom = _Streams(*self._all_of(_Streams)), _Seldom(*self._all_of(_Seldom))
+        self._by_handle = {entity.handle.pointer: entity for kind in self._streams for entity in kind}
         self._wait_set = self._make_wait_set(self._streams, self._seldom)
         self._seldom_due = self._rarely_due = 0.0
 
@@ -142,9 +147,9 @@ class StreamExecutor(Executor):
             self._context.handle,
         )
 
-    def _wait(self, streams: _Streams, seldom: _Seldom | None, end: float) -> set[int]:
-        """Wait until a time [s], and return the handles of the streams that are ready."""
-        wait_set = self._wait_set
+    def _wait(self, seldom: _Seldom | None, end: float) -> list[list[int]]:
+        """Wait until a time [s], and return the handles of the streams that are ready, by their kind."""
+        wait_set, streams = self._wait_set, self._streams
         wait_set.clear_entities()
         for subscription in streams.subscriptions:
             wait_set.add_subscription(subscription.handle)
@@ -162,7 +167,7 @@ class StreamExecutor(Executor):
         wait_set.wait(timeout_sec_to_nsec(None if math.isinf(end) else max(end - time.monotonic(), 0.0)))
         if not self._context.ok():
             raise ExternalShutdownException
-        return {pointer for kind in _STREAM_KINDS for pointer in wait_set.get_ready_entities(kind)}
+        return [wait_set.get_ready_entities(kind) for kind in _STREAM_KINDS]
 
     def _see_to(self, seldom: _Seldom) -> None:
         """Run what services, clients and waitables have to do after the last wait."""
