@@ -80,10 +80,13 @@ class HubLoop:
 
     def margins(self) -> Margins:
         """How many times the gains, or how much delay in all, makes the loop unstable."""
-        return Margins(
-            first_unstable(lambda factor: self._growth(factor, self._gains.delay), 1.0, MOST_GAIN, EDGE_SAMPLES),
-            first_unstable(lambda delay: self._growth(1.0, delay), self._gains.delay, LONGEST_DELAY, EDGE_SAMPLES),
-        )
+        delay = self._gains.delay
+        gain = first_unstable(lambda factor: self._growth(factor, delay), 1.0, MOST_GAIN, EDGE_SAMPLES)
+        return Margins(gain, self.unstable_delay())
+
+    def unstable_delay(self) -> float:
+        """The least delay in all that makes the loop unstable [s]; infinite where the law takes none so long."""
+        return first_unstable(lambda delay: self._growth(1.0, delay), self._gains.delay, LONGEST_DELAY, EDGE_SAMPLES)
 
     def _growth(self, factor: float, delay: float) -> float:
         """Of a deviation, by each step: its logarithm; it begins in ψ2, and its first step is not counted."""

@@ -64,13 +64,13 @@ class RearLaw:
 
         self._gains, self._alpha1, self._alpha2 = gains, alpha1, alpha2
         speeds = np.array(gains.free_speeds)
-        self._angles = np.linspace(-alpha2, alpha2, len(speeds))
-        self._speeds = speeds
-        times = cumulative_trapezoid(1.0 / speeds, self._angles, initial=0.0)
+        angles = np.linspace(-alpha2, alpha2, len(speeds))
+        times = cumulative_trapezoid(1.0 / speeds, angles, initial=0.0)
         self._period = float(times[-1])
-        ahead = times / self._period - (self._angles + alpha2) / (2.0 * alpha2)
-        self._set_point = ahead - trapezoid(ahead, times) / self._period
-        self._accelerations = np.gradient(0.5 * speeds**2, self._angles)
+        ahead = times / self._period - (angles + alpha2) / (2.0 * alpha2)
+        self._speeds = speeds.tolist()
+        self._set_point = (ahead - trapezoid(ahead, times) / self._period).tolist()
+        self._accelerations = np.gradient(0.5 * speeds**2, angles).tolist()
         self._kept = float(speeds[0] / speeds[-1])
         self.reset()
 
@@ -104,9 +104,9 @@ class RearLaw:
         theta2, omega2 = self._ahead(sample, now)
         theta1 = sample.front.angle + self._pace * gains.delay
         phase = theta1 / (2.0 * self._alpha1) - theta2 / (2.0 * self._alpha2)
-        aim = float(np.interp(theta2, self._angles, self._set_point))
+        aim = self._at(theta2, self._set_point)
         stretch = self._pace / (2.0 * self._alpha1) * self._period
-        speed = float(np.interp(theta2, self._angles, self._speeds)) * stretch
+        speed = self._at(theta2, self._speeds) * stretch
         error = math.remainder(phase - 0.5 - aim, 1.0) * 2.0 * self._alpha2
         return gains.stiffness * error + gains.damping * (speed - omega2)
 
@@ -119,9 +119,16 @@ class RearLaw:
         for i in range(steps):
             while since <= now - self._gains.delay + i * PREDICTION_STEP:
                 torque, (since, following) = following, next(commands, (math.inf, 0.0))
-            pull = float(np.interp(theta, self._angles, self._accelerations))
+            pull = self._at(theta, self._accelerations)
             theta += omega * PREDICTION_STEP
             omega += (pull + torque / self._gains.inertia) * PREDICTION_STEP
             if theta >= self._alpha2:
                 theta, omega = theta - 2.0 * self._alpha2, omega * self._kept
         return theta, omega
+
+    def _at(self, theta: float, values: list[float]) -> float:
+        """Of values at even angles from −α to α, that at an angle between them; NumPy takes ten times as long for one."""
+        last = len(values) - 1
+        place = min(max((theta + self._alpha2) / (2.0 * self._alpha2), 0.0), 1.0) * last
+        before = min(int(place), last - 1)
+        return values[before] + (place - before) * (values[before + 1] - values[before])

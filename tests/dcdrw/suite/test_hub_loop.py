@@ -40,6 +40,6 @@ def test_without_the_law_the_multipliers_are_those_of_the_simulated_pair():
 def test_the_loop_is_stable_and_its_edge_of_delay_lies_beyond_what_the_law_allows_for(delay):
     loop = HubLoop(RIG, hub_gains(RIG, delay))
     assert max(abs(loop.multipliers())) < 0.1 < max(abs(loop.multipliers(0.0))) < 1.0
-    edge = loop.margins().delay
+    edge = loop.unstable_delay()
     assert edge > delay + 0.05
     assert loop._growth(1.0, 0.9 * edge) < 0.0 < loop._growth(1.0, 1.1 * edge)
