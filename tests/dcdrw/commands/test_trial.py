@@ -108,8 +108,8 @@ def test_a_person_s_trial_is_run_closed_loop_and_tells_the_force_on_the_person(t
     assert 'active' in (tmp_path / 'out' / 'synchronizer.log').read_text()
     with Recording(tmp_path / 'out') as recording:
         recorded = [SYNCHRONIZER_STATE, REAR_TORQUE_COMMAND, COUPLER_WRENCH, PERSON_FORCE, ENABLE]
-        assert all(recording.count(f'/{topic.name}') for topic in recorded)
-        told = recording.count(f'/{SYNCHRONIZER_STATE.name}')
+        assert all(recording.count(recording.find(topic.name, topic.type)) for topic in recorded)
+        told = recording.count(recording.find(SYNCHRONIZER_STATE.name, SYNCHRONIZER_STATE.type))
     trial, _ = read_trial(tmp_path / 'out')
     assert force['peak'] == np.abs(trial.motion.coupler_force).max(), 'as the picture says'
     assert told > len(trial.acts), 'what it does is told again and again, lest a lost message hide a fault'
