@@ -127,7 +127,7 @@ class RearLaw:
         return theta, omega
 
     def _at(self, theta: float, values: list[float]) -> float:
-        """Of values at even angles from −α to α, that between them at an angle; for one, NumPy takes ten times as long."""
+        """Of values at even angles from −α to α, that at an angle between them: ten times as fast as NumPy for one."""
         last = len(values) - 1
         place = min(max((theta + self._alpha2) / (2.0 * self._alpha2), 0.0), 1.0) * last
         before = min(int(place), last - 1)
