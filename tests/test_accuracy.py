@@ -10,7 +10,7 @@ from dcdrw_sim.motion.trajectory import run
 from dcdrw_sim.rig.simulator import SimulatorParams
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams
 
-TRIALS, SECONDS, RATE = 100, 12.0, 200.0
+TRIALS, SECONDS, RATE = 50, 12.0, 200.0
 NOISE, LOST = math.radians(0.2), 0.05
 NEAR_STRIKE = 0.015
 """Nobody can tell on which side of a strike a sample lies that is nearer to it than its noise [s]."""

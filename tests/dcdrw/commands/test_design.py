@@ -26,7 +26,8 @@ def parts(tmp_path):
 
 
 def test_best_pair_of_parts_with_card_and_numbers(tmp_path, parts, capsys):
-    assert main(['design', '--available', str(parts), '--k', '5.25', '--b', '100', '--out', str(tmp_path / 'out')]) == 0
+    given = ['--k', '5.25', '--b', '100', '--seconds', '30']
+    assert main(['design', '--available', str(parts), *given, '--out', str(tmp_path / 'out')]) == 0
     output = capsys.readouterr().out
     assert 'fastest          k = 12 N/m, b = 8 N·s/m' in output
     assert 'firm, thin' in output
@@ -65,7 +66,7 @@ def test_parts_for_an_uncertain_rig_need_no_folder_for_a_card(tmp_path, parts, c
 def test_what_swings_beyond_the_band_is_not_recommended_and_what_is_the_monitor_has_seen(tmp_path, capsys):
     path = tmp_path / 'parts.csv'
     path.write_text('kind,value\nspring,16\ndashpot,10\n')
-    given = ['--k', '41.1', '--b', '14.7']
+    given = ['--k', '41.1', '--b', '14.7', '--seconds', '30']
     assert main(['design', '--available', str(path), *given, '--out', str(tmp_path / 'out')]) == 0
     output = capsys.readouterr().out
     assert 'fastest          k = 16 N/m, b = 10 N·s/m' in output
