@@ -18,6 +18,9 @@ LITTLE_ENDIAN = b'\0\1\0\0'
 STAMP_SIZE = 8
 """Its first field, a stamp, in bytes."""
 
+MOST_LAYOUTS = 4
+"""Of so many sources, or of one that sends its joints in so many messages, the layouts are kept."""
+
 
 class Stamp(NamedTuple):
     """A `builtin_interfaces/Time`."""
@@ -44,24 +47,23 @@ class JointNumbers(NamedTuple):
 
 
 class JointStateReader:
-    """Reads the serialized joint states of one stream, whose names and lengths seldom change."""
+    """Reads the serialized joint states of one topic, whose sources seldom change names and lengths."""
 
     def __init__(self) -> None:
-        self._layout: _Layout | None = None
+        self._layouts: list[_Layout] = []
 
     def __call__(self, data: bytes) -> Any:
         """The message, or what it says.
 
         Raises:
-            Exception: what rclpy raises where the bytes are no such message.
+            RuntimeError: of rclpy, where the bytes are no such message.
 
         """
-        layout = self._layout
-        said = layout and layout.read(data)
-        if said:
-            return said
+        for layout in self._layouts:
+            if said := layout.read(data):
+                return said
         message = deserialize_message(data, JointState)
-        self._layout = _Layout(message)
+        self._layouts = [_Layout(message), *self._layouts[: MOST_LAYOUTS - 1]]
         return message
 
 

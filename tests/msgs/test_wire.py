@@ -49,6 +49,7 @@ def test_joint_states_are_read_as_rclpy_reads_them_whatever_changes_on_the_way(m
         assert said(read(serialize_message(message))) == said(message)
         message.header.stamp.sec = sec
         message.position = [number] * len(message.position)
+    for message in messages:  # in turn, as of a source that sends its joints one by one
         again = read(serialize_message(message))
         assert said(again) == said(message)
         assert not isinstance(again, JointState), 'it is laid out as before, and rclpy was asked all the same'
