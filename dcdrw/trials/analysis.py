@@ -15,6 +15,7 @@ from dcdrw.suite.parameter_file import TrialParams
 from dcdrw.trials.acts import Acts
 from dcdrw.trials.course import Course, Gap
 from dcdrw.trials.motion import MotionTable, Sink
+from dcdrw.trials.strike_check import Contradiction, StrikeCheck
 from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.in_step import strikes_in_step
 from dcdrw_msgs_py.rig import FRONT
@@ -81,6 +82,8 @@ class Analysis(NamedTuple):
     """Messages, from the first of `motion` on; those that were refused included."""
     unreadable: str
     """Why the last one that could not be read could not be; empty where all could."""
+    contradictions: tuple[Contradiction, ...] = ()
+    """What the strikes say against zeros and spokes; not looked for where other parameters seem wrong."""
     wheels_apart: float = 0.0
     """By how much later the rear wheel's own messages were recorded than the front wheel's, by their stamps [s]."""
     damage: tuple[str, ...] = ()
@@ -181,7 +184,8 @@ class _Trial:
         self._lone = LoneWheels(params.phase)
         self._estimator = PhaseEstimator(params.phase)
         self._monitor = SyncMonitor(params.sync)
-        self._course = Course(sinks)
+        self._strikes = StrikeCheck()
+        self._course = Course([*sinks, self._strikes])
         self._moving = False
         self._is_held = True
         self._received = 0
@@ -233,8 +237,8 @@ class _Trial:
         self._course.add(
             [
                 batch.stamp_ns[taken] - np.array(clock_ns),
-                batch.position[taken, front] * front_scale,
-                batch.position[taken, rear] * rear_scale,
+                batch.position[taken, front] * front_scale - joints.front_zero,
+                batch.position[taken, rear] * rear_scale - joints.rear_zero,
                 *known,
                 *(column for turns in (front_turns, rear_turns, phis) for column in _columns(turns)),
                 np.array(differences, np.int64),
@@ -345,6 +349,7 @@ class _Trial:
         self._estimator.note_unstamped(self._lone.unstamped)
         course = self._course
         motion = course.motion
+        estimator = self._estimator.status()
         return Analysis(
             params=self._params,
             motion=motion,
@@ -358,7 +363,8 @@ class _Trial:
             judged_footfalls=tuple(course.footfalls[self._first_footfall :]),
             unseen=frozenset(course.unseen),
             status=self._monitor.status(),
-            estimator=self._estimator.status(),
+            estimator=estimator,
+            contradictions=() if estimator.hints else self._strikes.contradictions(self._params.phase),
             cadence=self._cadence(),
             joint_states=self._received,
             unreadable=self._unreadable,

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from dcdrw.trials.acts import stretches
 from dcdrw.trials.analysis import Analysis, Resumption
+from dcdrw.trials.strike_check import Contradiction
 from dcdrw_control.sync.safety import State
 from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.rig import FRONT, REAR
@@ -36,6 +37,8 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
     estimator, cadence = trial.estimator, trial.cadence
     for hint in hints_in_words(estimator.hints):
         yield Remark(_as_sentence(hint), True)
+    for one in trial.contradictions:
+        yield Remark(_contradicted(one), True)
     if trial.status.too_coarse:
         yield Remark(_as_sentence(coarseness(trial.status)), True)
     shift = 100.0 * abs(trial.wheels_apart) * trial.status.steps / trial.seconds if trial.seconds > 0.0 else 0.0
@@ -109,6 +112,20 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         yield Remark(
             f'The counter of an encoder rolled over {counted(estimator.rollovers, "time")}, which is made good.'
         )
+
+
+def _contradicted(one: Contradiction) -> str:
+    """Which parameter the strikes of a wheel contradict, and what would go with them."""
+    if one.parameter.endswith('zero'):
+        return (
+            f'The {one.wheel} wheel is braked {math.degrees(one.value - one.thought):+.0f}° from where it should '
+            f'strike: is its zero right? (parameter {one.parameter}; {one.value:.2f} rad would go with its strikes).'
+        )
+    return (
+        f'The {one.wheel} wheel is braked {one.value:.3g} times a turn, not {one.thought:.3g} times: are the gear '
+        f'ratio of its encoder and its spokes right? (parameter {one.parameter}; {one.value:.3g} would go with its '
+        'strikes).'
+    )
 
 
 def _as_sentence(words: str) -> str:

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 from dcdrw.trials.analysis import Analysis
 from dcdrw.trials.remarks import Remark, remarks
+from dcdrw.trials.strike_check import Contradiction
 from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.quantity import flatten
 from dcdrw_msgs_py.samples import SECOND
@@ -37,6 +38,8 @@ class Samples(NamedTuple):
     """Times that the counter of an encoder rolled over, which is made good."""
     hints: tuple[Hint, ...]
     """Parameters that seem to be wrong."""
+    contradictions: tuple[Contradiction, ...]
+    """Zeros and numbers of spokes that the strikes contradict, and those that would go with them."""
 
 
 class Summary(NamedTuple):
@@ -128,6 +131,7 @@ def summarize(trial: Analysis) -> Summary:
             duplicates=trial.estimator.duplicates,
             rollovers=trial.estimator.rollovers,
             hints=trial.estimator.hints,
+            contradictions=trial.contradictions,
         ),
         damage=trial.damage,
         parameters={name: flatten(values) for name, values in trial.params._asdict().items()},

@@ -46,6 +46,9 @@ MOVING = 0.2
 
 MaxSpeed = Annotated[float, Quantity('the fastest a wheel can turn; more is an outlier', 'rad/s', above=0.0, live=True)]
 Sign = Annotated[int, Quantity('-1 where its rotation in joint_states falls as it rolls downhill', choices=(1, -1))]
+Zero = Annotated[
+    float, Quantity('its rotation in joint_states, downhill, where a spoke stands along the normal of the slope', 'rad')
+]
 
 
 class PhaseParams(NamedTuple):
@@ -73,6 +76,8 @@ class PhaseParams(NamedTuple):
     ] = 'rad'
     front_sign: Sign = 1
     rear_sign: Sign = 1
+    front_zero: Zero = 0.0
+    rear_zero: Zero = 0.0
     rollover: Annotated[
         float,
         Quantity(
@@ -393,9 +398,14 @@ class PhaseEstimator:
         )
 
     def _start(self, joints: JointSample) -> PhaseUpdate:
-        stamp_ns, front, rear = joints[:3]
-        self._front = Rotation(self.params.front.alpha, stamp_ns, front.angle, self._speed(front), self._tolerance)
-        self._rear = Rotation(self.params.rear.alpha, stamp_ns, rear.angle, self._speed(rear), self._tolerance)
+        params = self.params
+        self._front, self._rear = (
+            Rotation(shape.alpha, joints.stamp_ns, turn.angle, self._speed(turn), self._tolerance, zero)
+            for shape, turn, zero in (
+                (params.front, joints.front, params.front_zero),
+                (params.rear, joints.rear, params.rear_zero),
+            )
+        )
         return PhaseUpdate(self._take(joints), (), self._clock_ns)
 
     def _follow(self, joints: JointSample, dt: float) -> PhaseUpdate | None:

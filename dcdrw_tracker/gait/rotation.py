@@ -54,14 +54,16 @@ class Rotation:
     (ψ = −α) with noise.
     """
 
-    def __init__(self, alpha: float, stamp_ns: int, angle: float, rate: float, tolerance: Tolerance) -> None:
+    def __init__(
+        self, alpha: float, stamp_ns: int, angle: float, rate: float, tolerance: Tolerance, zero: float = 0.0
+    ) -> None:
         self.alpha = alpha
         self.pitch = 2.0 * alpha
         self._raw = self._first = angle
         # A counter that counts up from 0 has rolled back over it where it stands in its upper half.
         width = tolerance.rollover
-        self._offset = 0.0 if math.isnan(width) else -width * round(angle / width)
-        """What the source has lost in whole turns, or as its counter rolled over: ψ minus the raw angle [rad]."""
+        self._offset = -zero - (0.0 if math.isnan(width) else width * round(angle / width))
+        """What the source lost as it wrapped or its counter rolled over, less its zero: ψ minus the raw angle [rad]."""
         self.psi = angle = angle + self._offset
         """ψ, continuous [rad]."""
         self.rate = rate

@@ -493,3 +493,33 @@ def test_a_wheel_that_stands_still_has_no_other_gear():
     seen = [sample if i < 2000 else sample._replace(rear=Turn(stuck, 0.0)) for i, sample in enumerate(samples)]
     summary = summarize(trial(seen))
     assert (summary.state, summary.samples.hints) == (PairState.STALLED, ())
+
+
+def test_a_wrong_zero_is_said_with_what_mends_it_which_then_says_nothing():
+    """Both zeros alike leave the phase as it is, but not the steps."""
+    off = [
+        sample._replace(front=Turn(sample.front.angle + 0.2), rear=Turn(sample.rear.angle - 0.15))
+        for sample in rolled(60)
+    ]
+    summary = summarize(trial(off))
+    front, rear = summary.samples.contradictions
+    assert (front.parameter, rear.parameter, summary.complete) == ('front_zero', 'rear_zero', False)
+    assert (front.value, rear.value) == pytest.approx((0.2, -0.15), abs=0.04)
+    assert f'(parameter front_zero; {front.value:.2f} rad would go with its strikes)' in summary.sentence
+    params = TrialParams()
+    params = params._replace(phase=params.phase._replace(front_zero=0.2, rear_zero=-0.15))
+    mended = summarize(analyze([batch(off)], params))
+    assert (mended.complete, mended.steps_to_synchronization) == (True, 38)
+
+
+def test_encoders_of_both_wheels_with_another_gear_are_asked_about():
+    geared = [
+        sample._replace(front=Turn(2.0 * sample.front.angle), rear=Turn(2.0 * sample.rear.angle))
+        for sample in rolled(60)
+    ]
+    summary = summarize(trial(geared))
+    assert not summary.complete
+    assert [(one.parameter, one.value) for one in summary.samples.contradictions] == [
+        ('front.spokes', pytest.approx(6.0)),
+        ('rear.spokes', pytest.approx(6.0)),
+    ]
