@@ -121,16 +121,8 @@ def run(options: argparse.Namespace) -> int:
         params = params._replace(simulator=simulator._replace(person=simulator.person._replace(walks=True)))
         SimulatedRig(params.rig, params.simulator)  # an impossible walk is told before anything runs
     start, _ = params.simulator.start(params.rig)  # an impossible start is told before anything runs
-    # The joints are the simulator's, whatever the rig's own are called.
-    joints = PhaseParams()
-    params = params._replace(
-        phase=params.phase._replace(
-            S0=start.S0 - start.front.step_length,
-            front_joint=joints.front_joint,
-            rear_joint=joints.rear_joint,
-            coupler_joint=joints.coupler_joint,
-        )
-    )
+    phase = simulated_joints(params.phase)._replace(S0=start.S0 - start.front.step_length)
+    params = params._replace(phase=phase)
     filmed = filmed_rig(options, params) if options.camera else None
     folder = free_folder(options.out)
     folder.mkdir(parents=True, exist_ok=True)
@@ -153,6 +145,18 @@ def run(options: argparse.Namespace) -> int:
             _synchronizer(params, options.person),
         ).run()
     return _finish(course, folder, options)
+
+
+def simulated_joints(phase: PhaseParams) -> PhaseParams:
+    """The same for the simulator's joints, whatever names, unit, signs and zeros the rig's own encoders have."""
+    joints = PhaseParams()
+    return phase._replace(
+        **{
+            name: getattr(joints, name)
+            for name in PhaseParams._fields
+            if name in ('unit', 'rollover') or name.endswith(('_joint', '_sign', '_zero'))
+        }
+    )
 
 
 def _synchronizer(params: TrialParams, law: str | None) -> SynchronizerParams | None:

@@ -16,11 +16,13 @@ import numpy as np
 import pytest
 
 from dcdrw.cli import main
+from dcdrw.commands.trial import simulated_joints
 from dcdrw.recordings.recording import Recording
 from dcdrw.trials.figure import ACTS_LABEL, trial_figure
 from dcdrw.trials.results import read_trial
 from dcdrw_msgs_py.diagnosis import STATE, STEPS_TO_SYNCHRONIZATION, PairState
 from dcdrw_msgs_py.topics import COUPLER_WRENCH, ENABLE, PERSON_FORCE, REAR_TORQUE_COMMAND, SYNCHRONIZER_STATE
+from dcdrw_tracker.gait.phase import PhaseParams
 from tests import ROOT
 from tests.children import nodes, runs
 from tests.patience import PATIENCE
@@ -231,3 +233,8 @@ def test_wrong_input_is_told_in_one_line(tmp_path, monkeypatch, capsys, argument
     assert message in errors
     assert errors.count('\n') == 1
     assert not Path('trials').exists()
+
+
+def test_a_rig_file_tells_the_estimator_nothing_of_encoders_that_a_simulator_does_not_have():
+    mine = PhaseParams(unit='deg', front_sign=-1, rear_zero=0.3, front_joint='hub', hysteresis_deg=2.0)
+    assert simulated_joints(mine) == PhaseParams(hysteresis_deg=2.0)
