@@ -35,6 +35,14 @@ WIDEST = 65_536
 """No picture has more pixels a side."""
 SHORTEST = 0.002
 """No lens has a focal length that is less of its picture's longer side: it would see 179.5° without a bend."""
+LONGEST = 100.0
+"""No lens has a focal length that is more: it would see half a degree."""
+SQUAREST = 3.0
+"""No pixel is more times as wide as it is high, or as high as it is wide."""
+LEAST_SEEN = 0.25
+"""Of a real lens's picture at least so much shows something: what lies around it may stay dark."""
+MOST_STRETCHED = 2.0
+"""No lens shows a thing more times as far from the middle as a pinhole does."""
 NEWTON_STEPS = 20
 """Enough to invert any lens that can be inverted at all; three do for a usual one."""
 RAY_TOLERANCE = 1e-10
@@ -138,9 +146,9 @@ def _undistort(bent: Floats, coefficients: Floats) -> Floats:
     if len(coefficients) == 4:
         return _undistort_fisheye(bent, coefficients)
     straight, step = bent.copy(), 1e-6
-    error = _distort(straight, coefficients) - bent
-    for _ in range(NEWTON_STEPS):
-        (a, c), (b, d) = (
+
+    def slopes() -> tuple[Floats, Floats]:
+        x, y = (
             (
                 _distort(straight + np.array(axis)[:, None] * step, coefficients)
                 - _distort(straight - np.array(axis)[:, None] * step, coefficients)
@@ -148,12 +156,20 @@ def _undistort(bent: Floats, coefficients: Floats) -> Floats:
             / (2.0 * step)
             for axis in ((1.0, 0.0), (0.0, 1.0))
         )
-        with np.errstate(divide='ignore', invalid='ignore'):
+        return x, y
+
+    error = _distort(straight, coefficients) - bent
+    with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
+        for _ in range(NEWTON_STEPS):
+            (a, c), (b, d) = slopes()
             straight = straight - np.stack((d * error[0] - b * error[1], a * error[1] - c * error[0])) / (a * d - b * c)
-        error = _distort(straight, coefficients) - bent
-        if not (np.abs(error) > RAY_TOLERANCE).any():
-            break
-    return np.where((np.abs(error) <= RAY_TOLERANCE).all(axis=0), straight, np.nan)
+            error = _distort(straight, coefficients) - bent
+            if not (np.abs(error) > RAY_TOLERANCE).any():
+                break
+        (a, c), (b, d) = slopes()
+        # Beyond the fold of a strong distortion the model comes back into the picture, turned over: no lens does.
+        good = (np.abs(error) <= RAY_TOLERANCE).all(axis=0) & (a * d - b * c > 0.0) & (a + d > 0.0)
+    return np.where(good, straight, np.nan)
 
 
 def pinhole(width: int, height: int, field_of_view_deg: float) -> Camera:
@@ -202,7 +218,35 @@ def make_camera(
             f'{source}: camera_matrix.data must be fx, 0, cx, 0, fy, cy, 0, 0, 1 row by row, got '
             f'{[float(x) for x in K.flat]}{": it is transposed" if K[2, 0] and not K[0, 2] else ""}'
         )
-    return Camera(int(width), int(height), K, _coefficients(model, np.array(coefficients, float).ravel(), source))
+    if max(K[0, 0], K[1, 1]) > LONGEST * max(width, height) or not 1.0 / SQUAREST < K[0, 0] / K[1, 1] < SQUAREST:
+        raise ValueError(
+            f'{source}: focal lengths of {K[0, 0]:g} and {K[1, 1]:g} pixels are none of a picture of {width} x {height}'
+        )
+    if not (0.0 <= K[0, 2] <= width and 0.0 <= K[1, 2] <= height):
+        raise ValueError(
+            f'{source}: the centre ({K[0, 2]:g}, {K[1, 2]:g}) lies outside of the picture of {width} x {height}: was '
+            'the camera calibrated at another resolution?'
+        )
+    camera = Camera(int(width), int(height), K, _coefficients(model, np.array(coefficients, float).ravel(), source))
+    _check_lens(camera, source)
+    return camera
+
+
+def _check_lens(camera: Camera, source: str) -> None:
+    """Refuse a distortion that no lens has: one with which most of the picture shows nothing, or too little of it."""
+    if camera.is_straight:
+        return
+    columns, rows = (np.linspace(0.0, pixels - 1.0, 9) for pixels in camera[:2])
+    pixels = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+    with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
+        rays = np.hypot(*camera.rays(pixels).T)
+        bent = np.hypot(*np.linalg.solve(camera.matrix[:2, :2], (pixels - camera.matrix[:2, 2]).T))
+        seen = MOST_STRETCHED * rays >= bent
+    if seen.mean() < LEAST_SEEN:
+        raise ValueError(
+            f'{source}: no lens bends a picture as distortion_coefficients {camera.distortion.tolist()} of '
+            f'{camera.model} do: are they in the order of this model, and is it the right one?'
+        )
 
 
 def _coefficients(model: str, D: Floats, source: str) -> Floats:

@@ -106,11 +106,16 @@ class Field(NamedTuple):
         return value
 
     def _question(self, value: float) -> str:
-        """Whether an impossible angle was meant in degrees; below 1 it looks like radians."""
-        radians = math.radians(value) if math.isfinite(_as_float(value)) else math.nan
-        if self.quantity.unit != 'rad' or not abs(radians) >= math.radians(1.0) or not self.quantity.allows(radians):
+        """Whether an impossible value was meant in another unit; below 1 an angle looks like radians."""
+        unit, found = self.quantity.unit, _as_float(value)
+        if not math.isfinite(found) or (unit == 'rad' and abs(found) < 1.0):
             return ''
-        return f': degrees? {value:g}° is {radians:.6g} rad'
+        meant = [
+            f'{name}? {found:g}{sign} is {found * size:.6g} {unit}'
+            for name, sign, size in _MISTAKEN.get(unit, ())
+            if self.quantity.allows(found * size)
+        ]
+        return f': {"; ".join(meant)}' if meant else ''
 
     @property
     def requirement(self) -> str:
@@ -125,6 +130,14 @@ def _as_float(value: float) -> float:
         return math.inf
 
 
+_MISTAKEN = {
+    'rad': (('degrees', '°', math.radians(1.0)),),
+    'rad/s': (('degrees per second', '°/s', math.radians(1.0)),),
+    'm': (('millimetres', ' mm', 1e-3), ('centimetres', ' cm', 1e-2)),
+    'kg': (('grams', ' g', 1e-3),),
+    's': (('milliseconds', ' ms', 1e-3),),
+}
+"""Units that are mistaken for the one in SI: name, sign and size."""
 _KIND_NAMES: dict[type, str] = {int: 'a whole number', float: 'a number', bool: 'true or false', str: 'a string'}
 
 

@@ -10,7 +10,7 @@ FRONT = 'front'
 REAR = 'rear'
 
 
-Length = Annotated[float, Quantity('hub to foot, ℓ', 'm', above=0.0)]
+Length = Annotated[float, Quantity('hub to foot, ℓ', 'm', above=0.0, high=10.0)]
 Spokes = Annotated[float, Quantity('number of spokes, π/α; need not be whole', low=4.0, high=1000.0)]
 
 
@@ -46,7 +46,7 @@ class WheelParams(NamedTuple):
     """One rimless wheel; the paper's wheel by default."""
 
     length: Length = WheelShape().length
-    mass: Annotated[float, Quantity('mass, its centre at the hub, m', 'kg', above=0.0)] = 10.0
+    mass: Annotated[float, Quantity('mass, its centre at the hub, m', 'kg', above=0.0, high=1000.0)] = 10.0
     spokes: Spokes = WheelShape().spokes
     gyration: Annotated[
         float, Quantity('radius of gyration about the hub over ℓ, r; 0 for a point mass', low=0.0, high=2.0, live=True)
@@ -72,12 +72,14 @@ StanceDistance = Annotated[
     Quantity(
         'distance of the stance feet just before a strike of the front wheel, x1 − x2',
         'm',
+        low=-100.0,
+        high=100.0,
         derived='ℓ of the front wheel',
     ),
 ]
 Slope = Annotated[float, Quantity('slope γ, positive downhill', 'rad', low=-math.pi / 4, high=math.pi / 4, live=True)]
 
-Gravity = Annotated[float, Quantity('gravitational acceleration g', 'm/s²', above=0.0)]
+Gravity = Annotated[float, Quantity('gravitational acceleration g', 'm/s²', above=0.0, high=100.0)]
 
 
 class RigParams(NamedTuple):
@@ -89,7 +91,14 @@ class RigParams(NamedTuple):
     b: Annotated[float, Quantity('damping of the coupler', 'N·s/m', low=0.0, high=1e6, live=True)] = 100.0
     D0: Annotated[
         float,
-        Quantity('length of the coupler at rest', 'm', low=0.0, live=True, derived='S0 + ℓ sin α: at rest at φ = α'),
+        Quantity(
+            'length of the coupler at rest',
+            'm',
+            low=0.0,
+            high=100.0,
+            live=True,
+            derived='S0 + ℓ sin α: at rest at φ = α',
+        ),
     ] = math.nan
     S0: StanceDistance = math.nan
     slope: Slope = math.radians(2.0)

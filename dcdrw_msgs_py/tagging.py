@@ -41,11 +41,19 @@ class TagGroup(NamedTuple):
     ids: Annotated[tuple[int, ...], Quantity('ids of the tags', low=0)] = (0,)
     angles_deg: Annotated[
         tuple[float, ...],
-        Quantity("turn of each tag's upright from the slope normal at ψ = 0, positive rolling downhill", 'deg'),
+        Quantity(
+            "turn of each tag's upright from the slope normal at ψ = 0, positive rolling downhill",
+            'deg',
+            low=-360.0,
+            high=360.0,
+        ),
     ] = (0.0,)
-    x: Annotated[tuple[float, ...], Quantity("each tag's centre from the hub, downhill at ψ = 0", 'm')] = (0.0,)
+    x: Annotated[
+        tuple[float, ...], Quantity("each tag's centre from the hub, downhill at ψ = 0", 'm', low=-10.0, high=10.0)
+    ] = (0.0,)
     y: Annotated[
-        tuple[float, ...], Quantity("each tag's centre from the hub, along the slope normal at ψ = 0", 'm')
+        tuple[float, ...],
+        Quantity("each tag's centre from the hub, along the slope normal at ψ = 0", 'm', low=-10.0, high=10.0),
     ] = (0.0,)
     standoff: Annotated[
         float,
@@ -53,6 +61,7 @@ class TagGroup(NamedTuple):
             "how far the tags are before the plane of the wheel's feet, towards the camera: the debug picture needs it",
             'm',
             low=0.0,
+            high=10.0,
             derived=f'{CLEAR:g} ℓ; on the rear wheel {CLEAR + SPACING:g} ℓ, so that all tags are in one plane',
         ),
     ] = math.nan
@@ -62,7 +71,7 @@ class TagParams(NamedTuple):
     """All tags of the rig: one on each hub by default."""
 
     family: Annotated[str, Quantity(f'AprilTag family: {", ".join(FAMILIES)}')] = '36h11'
-    size: Annotated[float, Quantity('side of the black square', 'm', above=0.0)] = 0.16
+    size: Annotated[float, Quantity('side of the black square', 'm', above=0.0, high=5.0)] = 0.16
     front: TagGroup = TagGroup()
     rear: TagGroup = TagGroup(ids=(1,))
 

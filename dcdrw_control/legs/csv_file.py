@@ -4,6 +4,7 @@ import math
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
+from difflib import get_close_matches
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
@@ -22,7 +23,7 @@ from dcdrw_control.legs.samples import (
 from dcdrw_msgs_py.columns import check_pace, heading, number, size
 from dcdrw_msgs_py.rig import FRONT
 from dcdrw_msgs_py.samples import SECOND
-from dcdrw_msgs_py.text_file import read_rows
+from dcdrw_msgs_py.text_file import one_line, read_rows
 from dcdrw_msgs_py.topics import SIDES
 from dcdrw_msgs_py.values import Floats
 from dcdrw_msgs_py.words import counted
@@ -32,6 +33,8 @@ FASTEST = 35.0
 _COLUMN = re.compile(r'(?:(front|rear)_)?(?:(left|right)_)?(acc_[xyz]|gyr_[xyz]|contact|force|hip|hip_rate)')
 _UNITS = {'acc': 'm/s²', 'gyr': 'rad/s', 'force': 'N', 'hip': 'rad', 'hip_rate': 'rad/s'}
 """Of quantities, where the heading names none."""
+_WORDS = ('front', 'rear', 'left', 'right', 'acc', 'gyr', 'contact', 'force', 'hip', 'rate', 'x', 'y', 'z')
+"""Words of columns' names, in the order in which they stand there."""
 LATEST = 9e9
 """A later time is none that a stamp can tell [s]."""
 _TIMES = {'time': 's', 'time_s': 's', 'stamp_ns': 'ns'}
@@ -55,8 +58,9 @@ def read_legs(path: Path, rate: float = math.nan) -> LegTable:
     The columns are named, in one row or in two (sensor, axis): a first column `time` [s], `stamp_ns` or the sample's
     number, then for each leg `left_acc_x`, …, `left_gyr_z`, `left_contact` (0 or 1), `left_force` [N], `left_hip`
     [rad] or `left_hip_rate` [rad/s], with `front_` or `rear_` before it where there are two halves, and without the
-    side where there is one leg. A unit in brackets behind a name counts. Columns of other names are passed over. A file
-    of two columns without names is the time [s] and the left foot's vertical force [N].
+    side where there is one leg. A unit in brackets behind a name counts. Columns of other names are passed over, but
+    for one that is misspelt. A file of two columns without names is the time [s] and the left foot's vertical force
+    [N].
 
     Args:
         path: the file.
@@ -76,6 +80,8 @@ def read_legs(path: Path, rate: float = math.nan) -> LegTable:
     for (name, unit), column in zip(headings, table.T, strict=True):
         found = _COLUMN.fullmatch(name)
         if not found:
+            if (meant := _meant(name)) and meant not in names:
+                raise ValueError(f'{path}: the column {one_line(name)} is none that is known; did you mean {meant}?')
             continue
         if np.isnan(column).all():
             raise ValueError(f'{path}: the column {name} has no number: leave it out')
@@ -100,6 +106,13 @@ def read_legs(path: Path, rate: float = math.nan) -> LegTable:
         check_pace(path, seconds)
     readings = sorted(chain.from_iterable(parts), key=lambda reading: reading.stamp_ns)
     return LegTable(readings, (len(seconds) - 1) / float(seconds[-1] - seconds[0]), degrees)
+
+
+def _meant(name: str) -> str:
+    """The column that a name means, but for the spelling and order of its words; empty where it means another thing."""
+    near = [get_close_matches(word, _WORDS, n=1, cutoff=0.75) for word in re.split(r'[^a-z0-9]+', name)]
+    meant = '_'.join(sorted((words[0] for words in near if words), key=_WORDS.index))
+    return meant if all(near) and _COLUMN.fullmatch(meant) else ''
 
 
 def _read(path: Path) -> tuple[list[tuple[str, str]], Floats]:

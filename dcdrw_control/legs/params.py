@@ -22,12 +22,13 @@ class LegParams(NamedTuple):
             'a sensor silent for longer leaves a gap: its leg is unknown until it strikes again',
             's',
             above=0.0,
+            high=60.0,
             live=True,
         ),
     ] = 0.2
-    rate: Annotated[float, Quantity('samples that are published per second at most', 'Hz', above=0.0, live=True)] = (
-        250.0
-    )
+    rate: Annotated[
+        float, Quantity('samples that are published per second at most', 'Hz', above=0.0, high=10_000.0, live=True)
+    ] = 250.0
     hip_joints: Annotated[
         tuple[str, ...], Quantity('names of the hips in leg_joint_states: front left and right, rear left and right')
     ] = HIPS
@@ -37,9 +38,9 @@ class LegParams(NamedTuple):
             'how long before the heel strikes a hip is flexed most, share of a stride', low=0.0, high=0.5, live=True
         ),
     ] = 0.0
-    max_future: Annotated[float, Quantity('a stamp further ahead of the clock is refused', 's', low=0.0, live=True)] = (
-        0.5
-    )
+    max_future: Annotated[
+        float, Quantity('a stamp further ahead of the clock is refused', 's', low=0.0, high=60.0, live=True)
+    ] = 0.5
 
     def check_hips(self) -> None:
         """Refuse what names no hips.

@@ -27,13 +27,15 @@ LONGEST_DELAY = 0.2
 class HubGains(NamedTuple):
     """T = stiffness · (ψ_aim − ψ2) + damping · (ψ̇_aim − ψ̇2), as it is computed for a rig."""
 
-    stiffness: Annotated[float, Quantity('torque by the phase error at the rear wheel', 'N·m/rad', low=0.0)] = 0.0
-    damping: Annotated[float, Quantity('torque by its rate', 'N·m·s/rad', low=0.0)] = 0.0
+    stiffness: Annotated[
+        float, Quantity('torque by the phase error at the rear wheel', 'N·m/rad', low=0.0, high=1e6)
+    ] = 0.0
+    damping: Annotated[float, Quantity('torque by its rate', 'N·m·s/rad', low=0.0, high=1e6)] = 0.0
     free_speeds: Annotated[
         tuple[float, ...],
         Quantity("the rear wheel's speeds in its free gait, evenly spaced in angle from −α to α", ''),
     ] = ()
-    inertia: Annotated[float, Quantity('of the rear wheel about its foot', 'kg·m²', low=0.0)] = 0.0
+    inertia: Annotated[float, Quantity('of the rear wheel about its foot', 'kg·m²', low=0.0, high=1e5)] = 0.0
     delay: Annotated[
         float, Quantity('from a sample to the torque that answers it', 's', low=0.0, high=LONGEST_DELAY)
     ] = 0.0

@@ -27,7 +27,9 @@ class SynchronizerParams(NamedTuple):
     hub: HubGains = HubGains()
     damping: Annotated[
         float,
-        Quantity('damping that the force adds to the coupler, where its own would stall the pair', 'N·s/m', low=0.0),
+        Quantity(
+            'damping that the force adds to the coupler, where its own would stall the pair', 'N·s/m', low=0.0, high=1e6
+        ),
     ] = 0.0
     front: WheelShape = WheelShape()
     rear: WheelShape = WheelShape()

@@ -6,7 +6,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dcdrw_msgs_py.quantity import suggestion
+from dcdrw_msgs_py.quantity import check, suggestion
 from dcdrw_msgs_py.rig import RigParams, WheelParams
 from dcdrw_msgs_py.text_file import one_line, read_text
 from dcdrw_sim.model.dynamics import State
@@ -101,7 +101,7 @@ def _parse(entry: Json, where: str) -> Case:
     rig = RigParams(front=front, rear=rear, k=k, b=b, D0=D0, S0=S0, slope=slope, gravity=g, **friction)
     state = State(*_numbers(raw, 'x0', where, 4))
     try:
-        Simulation(rig, state)
+        Simulation(check(rig), state)
     except ValueError as error:
         raise ValueError(f'{where}: {error}') from None
     strikes = entry.get('strikes')

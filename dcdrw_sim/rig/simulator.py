@@ -27,18 +27,24 @@ class SimulatorParams(NamedTuple):
     initial_phase_percent: Annotated[
         float, Quantity('phase at the start, front wheel just after a strike', '% of a step', low=0.0, high=99.999)
     ] = 21.6
-    theta1: Annotated[float, Quantity('front stance angle at the start', 'rad', derived=FROM_PHASE)] = math.nan
-    omega1: Annotated[float, Quantity('front speed at the start', 'rad/s', derived=FROM_PHASE)] = math.nan
-    theta2: Annotated[float, Quantity('rear stance angle at the start', 'rad', derived=FROM_PHASE)] = math.nan
-    omega2: Annotated[float, Quantity('rear speed at the start', 'rad/s', derived=FROM_PHASE)] = math.nan
-    noise_deg: Annotated[float, Quantity('noise of the encoders, one standard deviation', '°', low=0.0, live=True)] = (
-        0.0
+    theta1: Annotated[
+        float, Quantity('front stance angle at the start', 'rad', -math.pi / 2, math.pi / 2, derived=FROM_PHASE)
+    ] = math.nan
+    omega1: Annotated[float, Quantity('front speed at the start', 'rad/s', -100.0, 100.0, derived=FROM_PHASE)] = (
+        math.nan
     )
+    theta2: Annotated[
+        float, Quantity('rear stance angle at the start', 'rad', -math.pi / 2, math.pi / 2, derived=FROM_PHASE)
+    ] = math.nan
+    omega2: Annotated[float, Quantity('rear speed at the start', 'rad/s', -100.0, 100.0, derived=FROM_PHASE)] = math.nan
+    noise_deg: Annotated[
+        float, Quantity('noise of the encoders, one standard deviation', '°', low=0.0, high=90.0, live=True)
+    ] = 0.0
     drop_percent: Annotated[float, Quantity('samples lost at random', '%', low=0.0, high=100.0, live=True)] = 0.0
     seed: Annotated[int, Quantity('of noise and losses', low=0)] = 0
-    command_timeout: Annotated[float, Quantity('a command older than this counts as 0', 's', above=0.0, live=True)] = (
-        0.04
-    )
+    command_timeout: Annotated[
+        float, Quantity('a command older than this counts as 0', 's', above=0.0, high=60.0, live=True)
+    ] = 0.04
     person: PersonParams = PersonParams()
 
     def check_pace(self) -> None:

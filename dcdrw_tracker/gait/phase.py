@@ -44,7 +44,9 @@ MANY_SLOW = 5
 MOVING = 0.2
 """A wheel that is slower tells nothing about the clock [rad/s]."""
 
-MaxSpeed = Annotated[float, Quantity('the fastest a wheel can turn; more is an outlier', 'rad/s', above=0.0, live=True)]
+MaxSpeed = Annotated[
+    float, Quantity('the fastest a wheel can turn; more is an outlier', 'rad/s', above=0.0, high=1000.0, live=True)
+]
 Sign = Annotated[int, Quantity('-1 where its rotation in joint_states falls as it rolls downhill', choices=(1, -1))]
 Zero = Annotated[
     float, Quantity('its rotation in joint_states, downhill, where a spoke stands along the normal of the slope', 'rad')
@@ -62,9 +64,9 @@ class PhaseParams(NamedTuple):
         Quantity('a strike counts back only when ψ recedes by more than this', 'deg', low=0.0, high=10.0, live=True),
     ] = 1.5
     max_speed: MaxSpeed = 20.0
-    max_future: Annotated[float, Quantity('a stamp further ahead of the clock is refused', 's', low=0.0, live=True)] = (
-        0.5
-    )
+    max_future: Annotated[
+        float, Quantity('a stamp further ahead of the clock is refused', 's', low=0.0, high=60.0, live=True)
+    ] = 0.5
     restart_samples: Annotated[
         int,
         Quantity(

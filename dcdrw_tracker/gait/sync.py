@@ -70,11 +70,19 @@ class SyncParams(NamedTuple):
     ] = HOLD_STEPS
     stale_after: Annotated[
         float,
-        Quantity('without a sample for this long the input is stale; start afresh', 's', above=0.0, live=True),
+        Quantity(
+            'without a sample for this long the input is stale; start afresh', 's', above=0.0, high=60.0, live=True
+        ),
     ] = 1.0
     stall_after: Annotated[
         float,
-        Quantity('a wheel without a strike for this long has stalled; a step takes 0.56 s', 's', above=0.0, live=True),
+        Quantity(
+            'a wheel without a strike for this long has stalled; a step takes 0.56 s',
+            's',
+            above=0.0,
+            high=60.0,
+            live=True,
+        ),
     ] = 3.0
 
 

@@ -34,7 +34,8 @@ LEAST_TRAVEL = 0.5
 """A hub that goes at least so far, as a share of what its wheel rolls, and the other way, is none that rolls."""
 
 OffsetDeg = Annotated[
-    float, Quantity("ψ of the wheel while that axis of its body lies along the slope's normal", 'deg')
+    float,
+    Quantity("ψ of the wheel while that axis of its body lies along the slope's normal", 'deg', low=-360.0, high=360.0),
 ]
 
 
@@ -46,6 +47,8 @@ class PoseParams(NamedTuple):
         Quantity(
             'direction of downhill in the room, from x towards y (with y up: towards -z)',
             'deg',
+            low=-360.0,
+            high=360.0,
             derived='from the rear hub to the front one',
         ),
     ] = math.nan

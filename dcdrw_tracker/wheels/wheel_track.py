@@ -46,7 +46,11 @@ class TrackParams(NamedTuple):
     max_acceleration: Annotated[
         float,
         Quantity(
-            'beyond what gravity and strikes do, a wheel gains at most so much speed', 'rad/s²', above=0.0, live=True
+            'beyond what gravity and strikes do, a wheel gains at most so much speed',
+            'rad/s²',
+            above=0.0,
+            high=10_000.0,
+            live=True,
         ),
     ] = 20.0
     max_jump_deg: Annotated[

@@ -316,3 +316,32 @@ def test_a_bad_file_by_kalibr_is_told(text, message, tmp_path):
     path.write_text(text)
     with pytest.raises(ValueError, match=message):
         read_camera(path)
+
+
+@pytest.mark.parametrize(
+    ('model', 'coefficients'),
+    [
+        ('plumb_bob', [1e6, 0.0, 0.0, 0.0, 0.0]),
+        ('plumb_bob', [-5.0, 0.0, 0.0, 0.0, 0.0]),
+        ('plumb_bob', [-0.28, 0.09, 3.0, -0.0007, 0.0]),
+        ('rational_polynomial', [0.0, 0.0, 0.0, 0.0, 0.0, 1e4, 0.0, 0.0]),
+        ('equidistant', [-3.0, 0.0, 0.0, 0.0]),
+        ('equidistant', [1e5, 0.0, 0.0, 0.0]),
+    ],
+)
+def test_a_distortion_that_no_lens_has_is_refused(model, coefficients):
+    with pytest.raises(ValueError, match='camera_info: no lens bends a picture as distortion_coefficients'):
+        make_camera(1280, 720, MATRIX, model, coefficients)
+
+
+@pytest.mark.parametrize(
+    ('width', 'height', 'matrix', 'message'),
+    [
+        (640, 480, [900.0, 0.0, 960.0, 0.0, 900.0, 540.0, 0.0, 0.0, 1.0], 'outside of the picture of 640 x 480'),
+        (1280, 720, [9e6, 0.0, 640.0, 0.0, 9e6, 360.0, 0.0, 0.0, 1.0], 'are none of a picture of 1280 x 720'),
+        (1280, 720, [900.0, 0.0, 640.0, 0.0, 90.0, 360.0, 0.0, 0.0, 1.0], 'are none of a picture of 1280 x 720'),
+    ],
+)
+def test_a_matrix_that_is_none_of_the_picture_is_refused(width, height, matrix, message):
+    with pytest.raises(ValueError, match=message):
+        make_camera(width, height, matrix, 'plumb_bob', [])

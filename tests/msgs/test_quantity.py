@@ -157,6 +157,6 @@ def test_bounds_in_words():
 
 
 def test_a_set_built_by_hand_is_checked_too():
-    with pytest.raises(ValueError, match=r'rear\.mass must be > 0 kg, got -1'):
+    with pytest.raises(ValueError, match=r'rear\.mass must be > 0, ≤ 1000 kg, got -1'):
         check(RigParams(rear=WheelParams(mass=-1)))
     assert type(check(RigParams(k=5)).k) is float

@@ -43,7 +43,7 @@ def test_only_what_does_not_move_the_feet_may_change_while_a_node_runs():
     ('rig', 'message'),
     [
         (RigParams(WheelParams(spokes=3)), r'front\.spokes must be ≥ 4'),
-        (RigParams(WheelParams(length=math.nan)), r'front\.length must be > 0 m'),
+        (RigParams(WheelParams(length=math.nan)), r'front\.length must be > 0, ≤ 10 m'),
         (RigParams(b=-0.1), r'b must be ≥ 0, ≤ 1e\+06 N·s/m'),
         (RigParams(slope=1.0), 'slope must be ≥ -0.785398, ≤ 0.785398 rad'),
         (RigParams(D0=-1.0), 'D0 must be ≥ 0 m'),

@@ -76,6 +76,9 @@ def test_a_file_of_one_leg_names_no_side_and_needs_no_time_where_the_rate_is_giv
         ('time,left_force,left_force\n0,1,2\n1,2,3\n', 'has two columns left_force'),
         ('time,left_force\n0,1\n0,2\n', 'must grow'),
         ('sample,left_force\n0,1\n1,2\n', '--rate'),
+        ('time,left_force,rigth_force\n0,1,1\n0.1,2,2\n', 'column rigth_force is none .* did you mean right_force?'),
+        ('time,left_force,force_right\n0,1,1\n0.1,2,2\n', 'column force_right is none .* did you mean right_force?'),
+        ('time,Rear Left Gyro X\n0,1\n0.1,2\n', 'column rear left gyro x .* did you mean rear_left_gyr_x?'),
         ('time,left_gyr_x\n0,1\n1,2\n', 'left_gyr_y'),
     ],
 )
@@ -85,6 +88,13 @@ def test_a_file_that_cannot_be_read_says_why(tmp_path, text, told):
     with pytest.raises(ValueError, match=told) as error:
         read_legs(path)
     assert str(path) in str(error.value)
+
+
+def test_other_sensors_columns_are_passed_over(tmp_path):
+    path = tmp_path / 'more.csv'
+    others = 'front_left_mag_x,left_knee,left_hip_torque,emg,left_force_2,battery'
+    path.write_text(f'time,left_force,{others}\n0,700,1,2,3,4,5,6\n0.01,690,1,2,3,4,5,6\n')
+    assert {type(reading.reading) for reading in read_legs(path).readings} == {WrenchReading}
 
 
 def test_names_are_read_in_any_case_and_with_their_units_and_an_empty_cell_makes_no_row_a_heading(tmp_path):

@@ -204,7 +204,7 @@ def test_a_motion_that_cannot_go_on_ends_the_film_and_says_why(tmp_path, capsys)
         (['--out', 'film.gif'], '--out must end in .mp4, .avi, .mkv, got film.gif'),
         (['--out', 'no/such/film.mp4'], 'no/such is not a folder'),
         (['--out', 'film.mp4', '--drop', '100'], '--drop must be ≥ 0 and < 100 %'),
-        (['--out', 'film.mp4', '--distance', '0'], 'distance must be > 0 m, got 0.0'),
+        (['--out', 'film.mp4', '--distance', '0'], 'distance must be > 0, ≤ 1000 m, got 0.0'),
         (['--out', 'film.mp4', '--occlude', 'all'], 'occlude must be front, rear, both or empty'),
         (['--out', 'film.mp4', '--camera', 'lens.yaml'], 'lens.yaml'),
         (['--out', 'film.mp4', '--rig', 'rig.yaml'], 'rear.ids: tag 0 is mounted twice'),

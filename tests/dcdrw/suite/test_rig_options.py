@@ -44,7 +44,7 @@ def test_an_option_counts_more_than_the_file(tmp_path):
 @pytest.mark.parametrize(
     ('arguments', 'message'),
     [
-        (('--mass', '-3'), r'front\.mass must be > 0 kg, got -3\.0 \(--mass\)'),
+        (('--mass', '-3'), r'front\.mass must be > 0, ≤ 1000 kg, got -3\.0 \(--mass\)'),
         (('--spokes', '3'), r'front\.spokes must be ≥ 4, ≤ 1000, got 3 \(--spokes\)'),
         (('--slope-deg', '60'), r'slope must be .* \(--slope-deg\)'),
     ],
@@ -63,6 +63,26 @@ def test_a_slope_in_degrees_is_asked_about(tmp_path):
     (tmp_path / 'rig.yaml').write_text('/**:\n  ros__parameters: {slope: 2}\n')
     with pytest.raises(ValueError, match=r'rad, got 2: degrees\? 2° is 0\.0349066 rad \(.*rig\.yaml\)'):
         chosen('--rig', str(tmp_path / 'rig.yaml'))
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'meant'),
+    [
+        ('front.length', 965.2, 'millimetres? 965.2 mm is 0.9652 m; centimetres? 965.2 cm is 9.652 m'),
+        ('front.length', 96.52, 'millimetres? 96.52 mm is 0.09652 m; centimetres? 96.52 cm is 0.9652 m'),
+        ('rear.mass', 10000, 'grams? 10000 g is 10 kg'),
+        ('S0', 965.2, 'millimetres? 965.2 mm is 0.9652 m; centimetres? 965.2 cm is 9.652 m'),
+        ('D0', 1200, 'millimetres? 1200 mm is 1.2 m; centimetres? 1200 cm is 12 m'),
+        ('theta1', 15, 'degrees? 15° is 0.261799 rad'),
+        ('stale_after', 1000, 'milliseconds? 1000 ms is 1 s'),
+        ('gravity', 9810, ''),
+    ],
+)
+def test_a_value_in_another_unit_is_refused_with_what_it_would_be(tmp_path, name, value, meant):
+    (tmp_path / 'rig.yaml').write_text(f'/**:\n  ros__parameters: {{{name}: {value}}}\n')
+    with pytest.raises(ValueError, match=rf'{name} must be .*, got {value}.*') as caught:
+        chosen('--rig', str(tmp_path / 'rig.yaml'))
+    assert f'got {value}{": " if meant else ""}{meant} ({tmp_path}' in str(caught.value)
 
 
 @pytest.mark.parametrize('name', TAKE_A_RIG)

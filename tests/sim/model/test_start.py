@@ -68,7 +68,7 @@ def test_the_gentlest_slope_named_is_gentle_enough():
 
 
 def test_an_impossible_rig_is_refused():
-    with pytest.raises(ValueError, match=r'front\.length must be > 0 m'):
+    with pytest.raises(ValueError, match=r'front\.length must be > 0, ≤ 10 m'):
         start(RigParams(WheelParams(length=0.0)), 0.5)
 
 

@@ -89,7 +89,7 @@ WITHOUT_K = {key: value for key, value in CASE.items() if key != 'k'}
         (CASE | {'x0': [0.5, 1.0, 0.0, 1.0]}, r'case 0 \(paper_rig\): theta1 of the start must be within ±α'),
         (CASE | {'alpha': [0.0, 0.2]}, r'alpha must be in \(0, π/4\] rad, got 0\.0'),
         (CASE | {'alpha': [0.2, 1.0]}, r'alpha must be in \(0, π/4\] rad, got 1\.0'),
-        (CASE | {'l': [1.0, -1.0]}, r'case 0 \(paper_rig\): rear\.length must be > 0 m, got -1\.0'),
+        (CASE | {'l': [1.0, -1.0]}, r'case 0 \(paper_rig\): rear\.length must be > 0, ≤ 10 m, got -1\.0'),
         (CASE | {'k': -1}, 'k must be ≥ 0'),
         (CASE | {'S0': 0.0, 'x0': [0.1, 1.0, 0.1, 1.0]}, 'the hubs met'),
     ],
