@@ -170,8 +170,10 @@ _HINTS: dict[Hint, str] = {
     '(parameter rollover, which takes a start in its upper half for one below 0)',
     'lone_jump': "one wheel's rotation jumped alone: does its encoder's counter roll over? "
     '(parameter rollover, by how much)',
-    'revolutions': 'the wheels turn slower than they can roll: are their rotations in revolutions? (parameter unit)',
-    'unit': 'the wheels turn faster than they can roll: are their rotations in degrees? (parameter unit)',
+    'revolutions': 'the wheels turn slower than they can roll: are their rotations in revolutions? '
+    '(parameter unit; of a film in slow motion, its frame rate)',
+    'unit': 'the wheels turn faster than they can roll: are their rotations in degrees? '
+    '(parameter unit; of a film, its frame rate)',
 }
 REFUSALS: dict[Refusal, str] = {
     'unreadable': 'a wheel is missing, or the message is malformed (see the parameters front_joint and rear_joint)',

@@ -131,9 +131,11 @@ class TagTracker:
             raise ValueError('no camera is known')
         height, width = frame.image.shape[:2]
         if (width, height) != (self._camera.width, self._camera.height):
+            turned = (height, width) == (self._camera.width, self._camera.height)
             raise ValueError(
                 f'the picture is {width}x{height}, but the camera is calibrated for '
-                f'{self._camera.width}x{self._camera.height}: let it send that size, or calibrate it anew'
+                f'{self._camera.width}x{self._camera.height}: '
+                + ('turn the video back by 90°' if turned else 'let it send that size, or calibrate it anew')
             )
         sighting = self._follower.follow(_grey(frame.image), frame.stamp_ns)
         view = self._viewer.view(frame.stamp_ns, sighting.detections)

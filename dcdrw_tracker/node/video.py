@@ -37,6 +37,8 @@ class VideoFile:
 
     def __init__(self, path: Path, frame_rate: float = math.nan) -> None:
         cv2 = opencv()
+        if path.is_dir():
+            raise ValueError(f'{path} is a folder: a video is needed, which ffmpeg makes of pictures, too')
         if not path.is_file():
             raise FileNotFoundError(f'there is no video {path}')
         with path.open('rb'):  # OpenCV does not tell why it cannot

@@ -347,7 +347,7 @@ def test_rotations_in_revolutions_bring_a_hint_at_the_unit():
     ]
     summary = summarize(trial(turns))
     assert (summary.samples.hints, summary.complete) == (('revolutions',), False)
-    assert 'in revolutions? (parameter unit)' in summary.sentence
+    assert 'in revolutions? (parameter unit' in summary.sentence
     assert summarize(trial(WALK)).samples.hints == ()
 
 

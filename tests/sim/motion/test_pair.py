@@ -161,7 +161,7 @@ def test_the_motion_depends_on_its_state_not_on_the_time(shift):
 
 
 @few
-@given(rigs, starts, st.builds(Scales, between(0.1, 10.0), between(0.1, 10.0), between(0.1, 10.0)))
+@given(rigs, starts, st.builds(Scales, between(0.1, 6.0), between(0.1, 10.0), between(0.1, 10.0)))
 def test_the_motion_scales(rig, start, scales):
     state = rolling(rig, *start)
     there = strikes_of(rig, state, 2.0)

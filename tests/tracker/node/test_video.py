@@ -207,3 +207,8 @@ def test_a_video_that_nobody_may_read_is_told_from_one_that_is_none(tmp_path, mo
     monkeypatch.setattr(Path, 'open', refuse)
     with pytest.raises(PermissionError, match=r'a\.avi'):
         VideoFile(path)
+
+
+def test_a_folder_of_pictures_is_no_video(tmp_path):
+    with pytest.raises(ValueError, match='is a folder: a video is needed, which ffmpeg makes of pictures'):
+        VideoFile(tmp_path)
