@@ -46,7 +46,7 @@ def test_only_what_does_not_move_the_feet_may_change_while_a_node_runs():
         (RigParams(WheelParams(length=math.nan)), r'front\.length must be > 0, ≤ 10 m'),
         (RigParams(b=-0.1), r'b must be ≥ 0, ≤ 1e\+06 N·s/m'),
         (RigParams(slope=1.0), 'slope must be ≥ -0.785398, ≤ 0.785398 rad'),
-        (RigParams(D0=-1.0), 'D0 must be ≥ 0 m'),
+        (RigParams(D0=-1.0), 'D0 must be ≥ 0, ≤ 100 m'),
     ],
 )
 def test_impossible_rigs_are_refused_by_name(rig, message):

@@ -487,7 +487,7 @@ def test_a_leg_beyond_its_guard_is_refused_by_name(state, name):
         ({'gravity': 0.0}, 'gravity must be > 0'),
         ({'front': WheelParams(spokes=3.0)}, r'front\.spokes must be ≥ 4'),
         ({'rear': WheelParams(mass=0.0)}, r'rear\.mass must be > 0, ≤ 1000 kg'),
-        ({'S0': math.inf}, 'S0 must be finite'),
+        ({'S0': math.inf}, 'S0 must be ≥ -100, ≤ 100 m'),
     ],
 )
 def test_an_impossible_rig_is_refused_by_name(change, message):
