@@ -87,7 +87,9 @@ class Field(NamedTuple):
             return self._chosen(self.kind(value))
         if self.kind in (bool, str) and isinstance(value, self.kind):
             return self._chosen(value)
-        raise ValueError(f'{self.name} must be {_KIND_NAMES[self.kind]}, got {value!r}')
+        plain = value.replace('_', '').replace(',', '.') if isinstance(value, str) and self.kind in (int, float) else ''
+        mend = f': write {plain}' if number(plain) is not None else ''
+        raise ValueError(f'{self.name} must be {_KIND_NAMES[self.kind]}, got {value!r}{mend}')
 
     def _read(self, value: Any) -> Any:
         """What was meant, where ROS or `ros2 param` takes it for something else."""

@@ -46,8 +46,12 @@ def read_text(path: Path, largest: int = LARGEST_TEXT, windows: bool = False) ->
     except UnicodeDecodeError as error:
         if windows:
             return data.decode('cp1252', errors='replace')
+        if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+            raise ValueError(f'{path} is UTF-16 text: save it as UTF-8') from None
         line = data.count(b'\n', 0, error.start) + 1
-        raise ValueError(f'{path}, line {line}: byte 0x{data[error.start]:02x} is not UTF-8 text') from None
+        raise ValueError(
+            f'{path}, line {line}: byte 0x{data[error.start]:02x} is not UTF-8 text: save it as UTF-8'
+        ) from None
 
 
 def csv_rows(path: Path, text: str, separator: str = ',') -> Iterator[tuple[int, list[str]]]:

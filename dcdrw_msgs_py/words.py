@@ -1,4 +1,6 @@
-"""Numbers in sentences."""
+"""Numbers and names in sentences."""
+
+from collections.abc import Iterable
 
 
 def counted(count: object, thing: str) -> str:
@@ -10,6 +12,17 @@ def counted(count: object, thing: str) -> str:
 
     """
     return f'{count} {thing}{"" if str(count) == "1" else "s"}'
+
+
+MOST_NAMED = 20
+"""Things that one sentence names."""
+
+
+def listed(names: Iterable[str], between: str = ', ') -> str:
+    """Names one after the other, of many the first ones."""
+    every = list(names)
+    more = len(every) - MOST_NAMED
+    return between.join([*every[:MOST_NAMED], *([f'{more} more'] if more > 0 else [])])
 
 
 def by_count(count: float, one: str, more: str) -> str:

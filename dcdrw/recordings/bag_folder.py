@@ -14,6 +14,7 @@ RECORDING = 'recording'
 STORAGES = ('.mcap', '.db3')
 COMPRESSIONS = ('.zstd', '.zst')
 """Endings of files that are compressed as a whole."""
+_ROS1 = '.bag'
 _PART = re.compile(r'(.*)_(\d+)')
 
 
@@ -45,9 +46,9 @@ def find_bag(path: Path) -> Bag:
         raise ValueError(f'{path} does not exist')
     if not path.is_dir():
         if not (path.is_file() and is_storage(path)):  # a pipe would keep its reader waiting
-            raise ValueError(
-                f'{path} is not a recording: give its folder, or a file that ends in {", ".join(STORAGES)}, '
-                f'or one of these and {COMPRESSIONS[0]}'
+            raise _no_recording(
+                path,
+                f'give its folder, or a file that ends in {", ".join(STORAGES)}, or one of these and {COMPRESSIONS[0]}',
             )
         return Bag(path, [path], [], {}, 0, [])
     for folder in (path, path / RECORDING):
@@ -57,7 +58,17 @@ def find_bag(path: Path) -> Bag:
             return _described(folder, files)
     if (path / METADATA).exists():
         raise ValueError(f'{path} has {METADATA} but none of the files that this tells of')
-    raise ValueError(f'{path} is not a recording: it has no {", ".join(f"*{end}" for end in STORAGES)} file')
+    raise _no_recording(path, f'it has no {", ".join(f"*{end}" for end in STORAGES)} file')
+
+
+def _no_recording(path: Path, why: str) -> ValueError:
+    """What to say of a path that means none."""
+    old = [path] if path.suffix == _ROS1 else sorted(path.glob(f'*{_ROS1}'))
+    if old:
+        return ValueError(
+            f'{old[0]} is a recording of ROS 1: `rosbags-convert --src {old[0]} --dst NEW` makes one of ROS 2 of it'
+        )
+    return ValueError(f'{path} is not a recording: {why}')
 
 
 def is_storage(path: Path) -> bool:

@@ -10,6 +10,7 @@ from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND, PoseSample
 from dcdrw_msgs_py.text_file import one_line
 from dcdrw_msgs_py.topics import FRONT_POSE
+from dcdrw_msgs_py.words import listed
 
 NAMES = ('{0}_pose', '{0}_wheel', '{0}_wheel/pose', '{0}/pose', '{0}_wheel/odom', '{0}_wheel/{0}_wheel')
 """What a wheel's topic or frame may be called, in any namespace; the first that both wheels have counts."""
@@ -64,7 +65,7 @@ def pose_sources(recording: Recording, namespace: str = '') -> PoseSources | Non
         spaces = sorted(one_line(pair.namespace) or '/' for pair in pairs)
         raise ValueError(
             f'{recording.path} has several suites with poses of the wheels: choose one with --namespace '
-            f'{" or ".join(spaces)}'
+            f'{listed(spaces, " or ")}'
         )
     return pairs[0] if pairs else None
 
@@ -85,26 +86,25 @@ def what_poses(recording: Recording) -> str:
         told[body.topic].append(one_line(body.frame))
     if not told:
         return ''
-    there = [f'{one_line(topic.name)} ({", ".join(words)})' for topic, words in islice(told.items(), _MOST_NAMED)]
+    there = [f'{one_line(topic.name)} ({", ".join(words)})' for topic, words in told.items()]
     return (
         f'poses of the wheels would do, in topics {NAMES[0].format(FRONT)} and {NAMES[0].format(REAR)} of '
         f'{FRONT_POSE.type}, say, or as frames {NAMES[1].format(FRONT)} and {NAMES[1].format(REAR)}: '
-        f'it has {", ".join(there)}'
+        f'it has {listed(there)}'
     )
 
 
 def _pairs(bodies: list[tuple[str, Body]]) -> list[PoseSources]:
     """Both wheels of each namespace, from bodies by their names."""
     found: dict[str, PoseSources] = {}
+    named = {(name, body.topic.type): body for name, body in reversed(bodies)}
     for pattern in NAMES:
         front_end, rear_end = (f'/{pattern.format(wheel)}' for wheel in (FRONT, REAR))
         for name, front in bodies:
             space = name.removesuffix(front_end)
-            rears = [
-                rear for other, rear in bodies if other == space + rear_end and rear.topic.type == front.topic.type
-            ]
-            if name.endswith(front_end) and rears:
-                found.setdefault(space, PoseSources(space, front, rears[0]))
+            rear = named.get((space + rear_end, front.topic.type))
+            if name.endswith(front_end) and rear:
+                found.setdefault(space, PoseSources(space, front, rear))
     return list(found.values())
 
 

@@ -14,7 +14,7 @@ from dcdrw.recordings.bag_folder import COMPRESSIONS, find_bag
 from dcdrw.recordings.joint_batch import JointBatch, decode_joints
 from dcdrw.recordings.recorder import PARAMETERS, require_libraries
 from dcdrw_msgs_py.text_file import one_line
-from dcdrw_msgs_py.words import by_count, counted
+from dcdrw_msgs_py.words import by_count, counted, listed
 
 BATCH = 4096
 """Messages that are decoded at once."""
@@ -133,9 +133,9 @@ class Recording(AbstractContextManager['Recording']):
         if found:
             spaces = sorted(one_line(topic.name).removesuffix(f'/{name.lstrip("/")}') or '/' for topic in found)
             raise ValueError(
-                f'{self.path} has several suites with {name}: choose one with --namespace {" or ".join(spaces)}'
+                f'{self.path} has several suites with {name}: choose one with --namespace {listed(spaces, " or ")}'
             )
-        others = ', '.join(one_line(topic.name) for topic in self.of_type(kind)) or 'none'
+        others = listed(one_line(topic.name) for topic in self.of_type(kind)) or 'none'
         namesakes = [
             f'; its {one_line(topic.name)} is of {_kind(topic)}'
             for topic in self.topics

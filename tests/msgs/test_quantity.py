@@ -120,6 +120,8 @@ def test_a_list_may_be_empty(nothing):
         ({'sizes': [0.0]}, r'sizes\[0\] must be > 0 m, got 0'),
         ({'left.size': 0}, r'left\.size must be > 0 m, got 0'),
         ({'left.size': 'large'}, r"left\.size must be a number, got 'large'"),
+        ({'left.size': '1,5'}, r"left\.size must be a number, got '1,5': write 1\.5"),
+        ({'left.size': '1_000'}, r"left\.size must be a number, got '1_000': write 1000"),
         ({'left.size': True}, r'left\.size must be a number, got True'),
         ({'left.size': None}, r'left\.size must be a number, got None'),
         ({'left.size': math.nan}, r'left\.size must be > 0 m, got nan'),

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dcdrw_msgs_py.words import by_count, counted
+from dcdrw_msgs_py.words import by_count, counted, listed
 
 
 @pytest.mark.parametrize(
@@ -15,3 +15,8 @@ def test_one_alone_is_singular(count, words):
 
 def test_so_is_its_verb():
     assert [by_count(count, 'is', 'are') for count in (0, 1, 2)] == ['are', 'is', 'are']
+
+
+def test_of_many_names_the_first_are_told():
+    assert listed('abc') == 'a, b, c'
+    assert listed(map(str, range(10_000)), ' or ') == ' or '.join([*map(str, range(20)), '9980 more'])

@@ -65,7 +65,8 @@ def test_what_pyyaml_would_write_plainly_is_quoted_where_a_node_would_take_it_fo
     [
         (b'a: [', 'is not YAML: while parsing'),
         (b'a:\n  b:\n\tc: 1', r'is not YAML: .*\(a tab indents a line: use blanks\)'),
-        (b'\xff\xfe\xff', 'is not UTF-8 text'),
+        (b'\xff\xfe\xff', 'is UTF-16 text: save it as UTF-8'),
+        (b'a: \xb0', 'line 1: byte 0xb0 is not UTF-8 text: save it as UTF-8'),
         (b'a: !!python/object/apply:os.system [ls]', 'is not YAML: could not determine a constructor'),
         (b'K: !!opencv-matrix [1, 2]', 'is not YAML: expected a mapping node, but found sequence'),
         (b'K: !!opencv-matrix 3', 'is not YAML: expected a mapping node, but found scalar'),

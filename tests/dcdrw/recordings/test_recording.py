@@ -493,6 +493,9 @@ def test_killed_ros2_bag_record_is_read_and_mended(tmp_path):
 def test_wrong_files_are_told_apart(tmp_path):
     (tmp_path / 'empty').mkdir()
     (tmp_path / 'notes.txt').write_text('not a bag')
+    (tmp_path / 'old').mkdir()
+    for name in ('old.bag', 'old/of_1.bag'):
+        (tmp_path / name).write_bytes(b'#ROSBAG V2.0\n')
     (tmp_path / 'text.mcap').write_text('this is not an MCAP file, whatever its name says')
     (tmp_path / 'text.db3').write_text('nor is this a data base')
     (tmp_path / 'short.mcap').write_bytes(b'\x89MCAP0\r\n')
@@ -506,6 +509,8 @@ def test_wrong_files_are_told_apart(tmp_path):
         'nowhere': 'does not exist',
         'empty': 'is not a recording: it has no *.mcap, *.db3 file',
         'notes.txt': 'is not a recording: give its folder, or a file that ends in .mcap, .db3',
+        'old.bag': 'is a recording of ROS 1: `rosbags-convert --src',
+        'old': 'is a recording of ROS 1: `rosbags-convert --src',
         'text.mcap': 'is not an MCAP file',
         'text.db3': 'is not an sqlite3 file',
         'short.mcap': 'nothing was recorded',
