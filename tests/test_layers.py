@@ -23,6 +23,7 @@ KNOW_ROS = {
     'dcdrw_msgs_py.executor',
     'dcdrw_msgs_py.messages',
     'dcdrw_msgs_py.image_messages',
+    'dcdrw_msgs_py.wire',
     'dcdrw.nodes.observer',
     'dcdrw.nodes.suite',
 }
