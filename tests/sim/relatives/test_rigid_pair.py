@@ -23,7 +23,9 @@ from dcdrw_sim.relatives.rigid_pair import (
 from tests.sim.rigs import ALPHA, between
 
 PAPER = RigParams().resolved()
-LONG = PAPER._replace(D0=1e4)
+SMALL = WheelParams(length=0.01)
+LONG = RigParams(SMALL, SMALL, D0=100.0).resolved()
+"""A bar ten thousand times as long as the spokes."""
 FRONT = WheelParams(0.9, 8.0, 11.0)
 UNEQUAL = RigParams(
     FRONT,
@@ -295,14 +297,14 @@ def test_fastest_phase_is_the_maximum_of_speed_and_tends_to_50_percent_with_the_
         return RigidPair(rig, phase).gait().velocity
 
     offsets = []
-    for bar in (1.0, 4.0, 16.0, 1e3):
+    for bar in (1.0, 4.0, 16.0, 100.0):
         rig = PAPER._replace(D0=bar)
         best = fastest_phase(rig)
         offsets.append(best - 0.5)
         top = speed(rig, best)
         assert all(speed(rig, phase) < top for phase in np.linspace(0.0, 0.999, 50))
         assert speed(rig, best + 0.01) - top == pytest.approx(speed(rig, best - 0.01) - top, rel=0.03)
-    assert offsets[-1] == pytest.approx(0.0, abs=2e-5)
+    assert offsets[-1] == pytest.approx(0.0, abs=1e-4)
     assert 0.0 < offsets[2] < offsets[1] < offsets[0] < 0.01
     assert offsets[1] / offsets[2] == pytest.approx(4.0, rel=0.1)  # as 1/D0
     assert fastest_phase(PAPER) == pytest.approx(0.5063, abs=1e-4)
