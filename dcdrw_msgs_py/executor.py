@@ -76,8 +76,9 @@ class StreamExecutor(Executor):
             self._look_up()
         ready: list[list[int]] = []
         seldom = None
-        if time.monotonic() < self._seldom_due:
-            ready = self._wait(None, min(end, self._seldom_due))
+        soon = min(end, self._seldom_due)
+        while not any(ready) and time.monotonic() < soon:  # a timer that is set anew ends a wait, too
+            ready = self._wait(None, soon)
         if not any(ready):
             asked = False
             if time.monotonic() < self._rarely_due:

@@ -191,9 +191,12 @@ class Outlet:
 
     def publish(self, message: Any) -> None:
         """Publish a message, or its bytes, to all who listen now; a listener of this process must not keep it."""
+        self._publish(message, self._is_heard_outside())
+
+    def _publish(self, message: Any, is_heard_outside: bool) -> None:
         if self._latched:
             self._last = message
-        if self._is_heard_outside():
+        if is_heard_outside:
             self._publisher.publish(message)
         if self._by_message and isinstance(message, bytes):
             message = deserialize_message(message, self._publisher.msg_type)
@@ -202,8 +205,9 @@ class Outlet:
 
     def publish_sample(self, sample: Any, write: Callable[[Any], Any]) -> None:
         """Publish a sample, as a message, or its bytes, that `write` makes of it where somebody needs one."""
-        if self.is_heard:
-            self.publish(write(sample))
+        is_heard_outside = self._is_heard_outside()
+        if self._by_message or is_heard_outside:
+            self._publish(write(sample), is_heard_outside)
         for take_sample in self._by_sample:
             take_sample(sample)
 
@@ -415,6 +419,13 @@ def publish_diagnosis(
 
     node.create_timer(1.0, publish, clock=steady_clock())
     return publish
+
+
+def clock_ns(node: Node) -> int:
+    """What a node's clock says [ns], at half the cost of the object that rclpy makes of it."""
+    clock = node.get_clock().handle
+    with clock:
+        return int(clock.get_now().nanoseconds)
 
 
 def steady_clock() -> Clock:

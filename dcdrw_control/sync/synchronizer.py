@@ -15,7 +15,7 @@ LawName = Literal['off', 'hold', 'rear']
 LAWS: tuple[LawName, ...] = get_args(LawName)
 MOST_STEPS_APART = 1
 """|n| beyond this is a slipped step."""
-LONGEST_PAUSE = 2.0
+LONGEST_PAUSE = 2.5
 """A longer time from command to command, in periods, is a pause of this process, and no silence of its input."""
 
 

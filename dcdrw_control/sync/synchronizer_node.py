@@ -30,7 +30,7 @@ SOON = 0.85
 """A sample that comes after so much of the time from command to command is answered at once: less latency, and one
 waking up less."""
 LATE = 1.25
-"""So much of that time after an answer the timer commands by itself: the next sample comes first, unless it is late."""
+"""So much of that time after an answer, at least, the timer waits: the next sample comes first, unless it is late."""
 WATCH_SECONDS = 0.1
 """How often other publishers and the clock are looked at [s]."""
 REPEAT_SECONDS = 1.0
@@ -57,7 +57,7 @@ class SynchronizerNode(Node):
         listen_aged(self, ENABLE, lambda message, age: self._core.enable(time.monotonic() - age, message.data))
         listen_aged(self, PHASE_STATE, self._on_message, take_sample=self._on_phase)
         publish_diagnosis(self, self._diagnose)
-        self._timer = self.create_timer(self._period, self._on_timer, clock=steady_clock())
+        self._timer = self.create_timer(self._period, self._tick, clock=steady_clock())
         self.create_timer(WATCH_SECONDS, self._watch, clock=steady_clock())
         self.create_timer(REPEAT_SECONDS, self._tell_state, clock=steady_clock())
         self._tick()
@@ -83,13 +83,9 @@ class SynchronizerNode(Node):
         now = time.monotonic()
         self._core.update(sample, now - age)
         if now >= self._due and age < self._period:  # an older one is of many that wait: read these first
-            self._timer.timer_period_ns = round(LATE * self._period * 1e9)
-            self._timer.reset()
+            if self._timer.time_until_next_call() < LATE * self._period * 1e9:
+                self._timer.handle.call_timer()  # a period later; to reset it would end the executor's next wait
             self._tick()
-
-    def _on_timer(self) -> None:
-        self._timer.timer_period_ns = round(self._period * 1e9)
-        self._tick()
 
     def _tick(self) -> None:
         now = time.monotonic()

@@ -11,7 +11,17 @@ from dcdrw_msgs_py.messages import (
     PhaseSampleWriter,
     footfall_message,
 )
-from dcdrw_msgs_py.node import Age, Parameters, advertise, follow_runs, listen, publish_diagnosis, publishers, run
+from dcdrw_msgs_py.node import (
+    Age,
+    Parameters,
+    advertise,
+    clock_ns,
+    follow_runs,
+    listen,
+    publish_diagnosis,
+    publishers,
+    run,
+)
 from dcdrw_msgs_py.rig import FRONT
 from dcdrw_msgs_py.samples import LoneWheel
 from dcdrw_msgs_py.topics import FOOTFALLS, JOINT_STATES, PHASE_STATE, PHI, STEP_DIFFERENCE
@@ -73,7 +83,7 @@ class PhaseEstimatorNode(Node):
                 )
         else:
             samples = [read]
-        now_ns = self.get_clock().now().nanoseconds
+        now_ns = clock_ns(self)
         for joints in samples:
             if update := self._estimator.update(joints, now_ns):
                 self._publish(update)

@@ -363,7 +363,7 @@ class SyncMonitor:
         if is_blind:
             foretold, is_wild = error, False
         self._judge(foretold, is_wild and not self._is_held, dt, edge)
-        if self._stalled(phase.stamp_ns):
+        if phase.stamp_ns - min(self._struck_ns.values()) > self._stall_ns and not self._is_held:
             self._since = strikes + 1
         if strikes_in_step(self._since, strikes) >= params.hold_steps:
             self._synchronized, self._lost = True, False
