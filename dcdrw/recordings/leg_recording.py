@@ -12,7 +12,7 @@ from dcdrw.recordings.recording import BATCH, Recording
 from dcdrw_control.legs.conversion import READERS, hip_readings
 from dcdrw_control.legs.samples import Leg, LegReading, LegUpdate
 from dcdrw_msgs_py.samples import SECOND, Turn
-from dcdrw_msgs_py.topics import LEG_JOINT_STATES, LEG_SENSORS, Topic
+from dcdrw_msgs_py.topics import LEG_JOINT_STATES, LEG_PHASES, LEG_SENSORS, PERSON_FORCE, Topic
 
 _TOPICS = (*LEG_SENSORS.values(), LEG_JOINT_STATES)
 
@@ -31,6 +31,11 @@ def find_topic(recording: Recording, topic: Topic, namespace: str = '') -> Strea
 def leg_topics(recording: Recording, namespace: str = '') -> list[Stream]:
     """The topics of sensors on legs that a recording has, in this namespace or in whatever one."""
     return [found for topic in _TOPICS if (found := find_topic(recording, topic, namespace))]
+
+
+def is_walked(recording: Recording, namespace: str = '') -> bool:
+    """Whether a wheel of this recording is a person's legs: sensed ones, or simulated ones that feel a force."""
+    return any(recording.found(topic.name, topic.type, namespace) for topic in (*_TOPICS, LEG_PHASES, PERSON_FORCE))
 
 
 def namespace_of(found: Stream) -> str:

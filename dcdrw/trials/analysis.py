@@ -147,7 +147,9 @@ class Analysis(NamedTuple):
         return 'no joint state was of use' if self.joint_states else 'there are no joint states'
 
 
-def analyze(batches: Iterable[JointBatch], params: TrialParams, sinks: Sequence[Sink] = ()) -> Analysis:
+def analyze(
+    batches: Iterable[JointBatch], params: TrialParams, sinks: Sequence[Sink] = (), rolls: bool = True
+) -> Analysis:
     """Run estimator and monitor over the joint states of a trial.
 
     The monitor starts afresh when the wheels are let go: with the last sample before a wheel moves. Memory stays the
@@ -157,9 +159,10 @@ def analyze(batches: Iterable[JointBatch], params: TrialParams, sinks: Sequence[
         batches: the joint states.
         params: of the nodes.
         sinks: each is given every row of the motion.
+        rolls: whether the wheels roll by themselves, so that their strikes can contradict their zeros and spokes.
 
     """
-    trial = _Trial(params, sinks)
+    trial = _Trial(params, sinks, rolls)
     with _no_collections():
         for batch in batches:
             trial.take(batch)
@@ -179,13 +182,13 @@ def _no_collections() -> Iterator[None]:
 
 
 class _Trial:
-    def __init__(self, params: TrialParams, sinks: Sequence[Sink]) -> None:
+    def __init__(self, params: TrialParams, sinks: Sequence[Sink], rolls: bool) -> None:
         self._params = params
         self._lone = LoneWheels(params.phase)
         self._estimator = PhaseEstimator(params.phase)
         self._monitor = SyncMonitor(params.sync)
         self._strikes = StrikeCheck()
-        self._course = Course([*sinks, self._strikes])
+        self._course = Course([*sinks, self._strikes] if rolls else sinks)
         self._moving = False
         self._is_held = True
         self._received = 0

@@ -10,6 +10,7 @@ from dcdrw.drawings.figure_files import figure_files
 from dcdrw.files import Table, table_file, to_json, write_csv, write_text, write_whole
 from dcdrw.recordings.derived_joints import derived_joints, joint_topic
 from dcdrw.recordings.joint_batch import JointBatch
+from dcdrw.recordings.leg_recording import is_walked
 from dcdrw.recordings.recorded_runs import recorded_runs, with_runs
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
@@ -61,7 +62,7 @@ def read_trial(
             params = read_parameter_file(rig, params, space)
         comparison = Comparison(recording, phi_pitch(params.sync.front, params.sync.rear), space)
         clock = Clock()
-        trial = analyze(clock.watch(batches), params, [*sinks, comparison])
+        trial = analyze(clock.watch(batches), params, [*sinks, comparison], rolls=not is_walked(recording, space))
         if trial.unreadable and not len(trial.motion.stamp_ns):
             mend = (
                 ' (front_joint and rear_joint in a rig file name them)' if trial.unreadable.startswith('joint') else ''

@@ -21,6 +21,8 @@ NEAR = 0.4
 """Part of a step on either side of a strike from which its loss of speed is taken."""
 LEAST_LOSS = 0.04
 """Part of its speed that a wheel must seem to lose for a strike [1]: 0.13 of a plain one with 12 spokes."""
+MOST_LOSS = 1.3
+"""A strike takes no more than so many times what it takes of a plain wheel, which loses most; a leg slows down more."""
 SAMPLES, NEAREST = 10, 0.12
 """That are enough on either side, but not within less than this part of a step: what is near is not yet blurred by the
 coupler."""
@@ -109,7 +111,7 @@ def doubt(time: Floats, psi: Floats, alpha: float) -> Doubt | None:
     if len(psi) < FEWEST * FEWEST or psi[-1] - psi[0] < FEWEST * pitch:
         return None
     thought = place(time, psi, pitch, alpha)
-    if thought.is_braked and thought.loss > 0.5 * (1.0 - math.cos(pitch)):  # of what a plain wheel loses
+    if thought.is_braked and thought.loss > 0.5 * _plain_loss(pitch):
         return None
     best = _best(places(time, psi, pitch))
     if best.is_braked and not best.is_sharp:
@@ -123,10 +125,23 @@ def doubt(time: Floats, psi: Floats, alpha: float) -> Doubt | None:
         more = at.loss > MORE * best.loss and at.loss - best.loss > SURE * math.hypot(at.error, best.error)
     else:
         more = at.score > CLEARLY * best.score
-    if at.is_sharp and at.exceeds(thought) and at.loss > SURER * at.error and more and abs(other / pitch - 1.0) > SAME:
+    if (
+        at.is_sharp
+        and at.loss < MOST_LOSS * _plain_loss(max(other, pitch))
+        and at.exceeds(thought)
+        and at.loss > SURER * at.error
+        and more
+        and abs(other / pitch - 1.0) > SAME
+    ):
         return Doubt(math.nan, math.tau / other)
     zero = math.remainder(best.at - alpha, pitch)
-    return Doubt(zero, math.nan) if best.exceeds(thought) and abs(zero) > LEAST_OFF * pitch else None
+    is_off = best.exceeds(thought) and best.loss < MOST_LOSS * _plain_loss(pitch) and abs(zero) > LEAST_OFF * pitch
+    return Doubt(zero, math.nan) if is_off else None
+
+
+def _plain_loss(pitch: float) -> float:
+    """The part of its speed that a plain wheel loses by a strike (paper's (15))."""
+    return 1.0 - math.cos(pitch)
 
 
 def _enough(time: Floats, psi: Floats, pitch: float) -> tuple[Floats, Floats]:

@@ -81,6 +81,7 @@ def test_a_recorded_person_before_a_robot_is_followed_by_estimator_and_monitor_t
     trial = analyze(wheel_batches(follow(readings).updates), TrialParams())
     assert trial.estimator.restarts == 0
     assert trial.estimator.refused['outlier'] == 0
+    assert trial.contradictions == ()  # legs are not braked as wheels are
     assert abs(trial.estimator.front_steps - trial.estimator.rear_steps) <= 1
     walking = (trial.motion.stamp_ns > 4 * 10**9) & (trial.motion.stamp_ns < 33 * 10**9)
     error = trial.motion.error_percent[walking]

@@ -519,6 +519,7 @@ def test_encoders_of_both_wheels_with_another_gear_are_asked_about():
     ]
     summary = summarize(trial(geared))
     assert not summary.complete
+    assert summarize(analyze([batch(geared)], TrialParams(), rolls=False)).complete, 'where it is a person who walks'
     assert [(one.parameter, one.value) for one in summary.samples.contradictions] == [
         ('front.spokes', pytest.approx(6.0)),
         ('rear.spokes', pytest.approx(6.0)),
