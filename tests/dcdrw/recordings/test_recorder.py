@@ -136,11 +136,13 @@ def test_full_disk_ends_the_recording_and_keeps_what_is_there(bench, tmp_path):
     process, joints, diagnostics = start(bench, tmp_path / 'bag')
     bench.wait(lambda: send(bench, joints) and (tmp_path / FILE).stat().st_size > 30_000, 'a chunk')
     size = (tmp_path / FILE).stat().st_size
-    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (size + 100, size + 100))  # no file grows any more
+    _, most = resource.prlimit(process.pid, resource.RLIMIT_FSIZE)
+    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (size + 100, most))  # no file grows any more
     bench.wait(lambda: send(bench, joints) and said(diagnostics).get(STATE) == RecorderState.FAILED, 'the news')
     assert said(diagnostics)[''] == f'the recording ended: File too large: {tmp_path}/bag; what came before is kept'
     assert process.poll() is None
     assert len(recorded_stamps(tmp_path / 'bag')) > 10
+    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (most, most))  # there is space again
     answer = bench.call(SetBool, '/recorder/record', SetBool.Request(data=True))
     assert not answer.success
     assert 'exists already, not overwriting' in answer.message

@@ -142,6 +142,7 @@ def test_each_trouble_has_one_message_and_tracking_goes_on_after_it(bench):
     expect(1, 'the rear wheel has never been seen; looking for tag 1', tags=(0,))
     expect(1, 'tag 1 is in the picture twice', tags=(0, 1, 1))
     expect(0, 'tracking both wheels')
+    filming.until(lambda: joints, 'joint states')
     before = JointSampleReader().read(joints[-1])
     expect(2, "the encoding 'sepia' is not read", spoil=encoded)
     count = len(joints)
