@@ -406,16 +406,15 @@ def publish_diagnosis(
         before, missing = missing, diagnosis.values.get(LOST_SAMPLES, 0)
         diagnosis = lost_since(diagnosis, before) if warns_of_losses else diagnosis
         unreadable = {f'unreadable bytes on {name}': box.unreadable for name, box in _inboxes(node) if box.unreadable}
-        values = {**diagnosis.values, **{f'messages dropped of {topic}': count for topic, count in lost.items()}}
-        values.update(unreadable)
+        unheard = {f'messages dropped of {topic}': count for topic, count in lost.items()}
+        values = {**diagnosis.values, **unheard, **unreadable}
         level, message = diagnosis.level, diagnosis.message
         if lost != told:
             news = ', '.join(f'{count - told.get(topic, 0)} of {topic}' for topic, count in lost.items())
             level, message = max(level, Level.WARN), f'overloaded: dropped {news} within a second; {message}'
             told.update(lost)
-        now_ns = node.get_clock().now().nanoseconds
         name = node.get_fully_qualified_name()
-        publisher.publish(diagnostics_message(name, Diagnosis(level, message, values), now_ns))
+        publisher.publish(diagnostics_message(name, Diagnosis(level, message, values), clock_ns(node)))
 
     node.create_timer(1.0, publish, clock=steady_clock())
     return publish

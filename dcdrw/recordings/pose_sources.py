@@ -10,13 +10,12 @@ from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND, PoseSample
 from dcdrw_msgs_py.text_file import one_line
 from dcdrw_msgs_py.topics import FRONT_POSE
-from dcdrw_msgs_py.words import listed
+from dcdrw_msgs_py.words import MOST_NAMED, listed
 
 NAMES = ('{0}_pose', '{0}_wheel', '{0}_wheel/pose', '{0}/pose', '{0}_wheel/odom', '{0}_wheel/{0}_wheel')
 """What a wheel's topic or frame may be called, in any namespace; the first that both wheels have counts."""
 LOOKED_AT = 10_000
 """Messages of a topic that are searched for frames."""
-_MOST_NAMED = 20
 _TF = 'tf2_msgs/msg/TFMessage'
 _TRANSFORM = 'geometry_msgs/msg/TransformStamped'
 _STATIC = 'tf_static'
@@ -82,7 +81,7 @@ def what_poses(recording: Recording) -> str:
     told: dict[Stream, list[str]] = {
         topic: [topic.type] for kind in (*_READERS, *_UNREAD) for topic in recording.of_type(kind)
     }
-    for body in _framed(recording)[:_MOST_NAMED]:
+    for body in _framed(recording)[:MOST_NAMED]:
         told[body.topic].append(one_line(body.frame))
     if not told:
         return ''

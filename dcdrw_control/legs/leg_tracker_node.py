@@ -14,7 +14,7 @@ from dcdrw_control.legs.samples import Leg, LegReading, Reading
 from dcdrw_control.legs.tracker import LegTracker
 from dcdrw_msgs_py.diagnosis import Diagnosis
 from dcdrw_msgs_py.messages import stamp_ns, turns_message
-from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, publish_diagnosis, run
+from dcdrw_msgs_py.node import Age, Parameters, advertise, clock_ns, listen, publish_diagnosis, run
 from dcdrw_msgs_py.topics import JOINT_STATES, LEG_JOINT_STATES, LEG_PHASES, LEG_SENSORS
 
 STALE_AFTER = 1.0
@@ -39,7 +39,7 @@ class LegTrackerNode(Node):
 
     def _on_sensor(self, leg: Leg, read: Callable[[Any], Reading], message: Any) -> None:
         # A Bool has no stamp of its own: it is of now.
-        stamp = stamp_ns(message.header.stamp) if hasattr(message, 'header') else self._now_ns()
+        stamp = stamp_ns(message.header.stamp) if hasattr(message, 'header') else clock_ns(self)
         self._take(stamp, leg, read(message))
 
     def _on_hips(self, message: Any) -> None:
@@ -53,7 +53,7 @@ class LegTrackerNode(Node):
             self._take(stamp_ns(message.header.stamp), leg, reading)
 
     def _take(self, stamp: int, leg: Leg, reading: Reading) -> None:
-        update = self._tracker.update(LegReading(stamp, leg, reading), self._now_ns())
+        update = self._tracker.update(LegReading(stamp, leg, reading), clock_ns(self))
         if self._tracker.refusal is None:
             self._age.renew()
         if update is None:
@@ -63,9 +63,6 @@ class LegTrackerNode(Node):
             self._phases.publish(turns_message(update.stamp_ns, legs))
         if update.wheels:
             self._joints.publish(turns_message(update.stamp_ns, update.wheels))
-
-    def _now_ns(self) -> int:
-        return int(self.get_clock().now().nanoseconds)
 
     def _diagnose(self) -> Diagnosis:
         return diagnose_legs(self._tracker.status(), self._age.seconds, STALE_AFTER)

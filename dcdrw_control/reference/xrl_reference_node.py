@@ -22,7 +22,7 @@ from dcdrw_control.reference.plan import TICK_NS, Trajectory
 from dcdrw_control.reference.reference import LegReference
 from dcdrw_msgs_py.diagnosis import Diagnosis
 from dcdrw_msgs_py.messages import PhaseSampleReader, stamp_ns, to_stamp, turns_message
-from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, publish_diagnosis, run
+from dcdrw_msgs_py.node import Age, Parameters, advertise, clock_ns, listen, publish_diagnosis, run
 from dcdrw_msgs_py.samples import SECOND, Turn
 from dcdrw_msgs_py.topics import (
     ENABLE,
@@ -77,7 +77,7 @@ class XrlReferenceNode(Node):
         return take
 
     def _take(self, sample: GaitSample) -> None:
-        update = self._core.update(sample, time.monotonic(), int(self.get_clock().now().nanoseconds))
+        update = self._core.update(sample, time.monotonic(), clock_ns(self))
         if update is None:
             return
         self._age.renew()

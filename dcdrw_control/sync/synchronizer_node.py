@@ -14,7 +14,7 @@ from dcdrw_control.sync.safety import State
 from dcdrw_control.sync.synchronizer import Command, Synchronizer, SynchronizerParams
 from dcdrw_msgs_py.diagnosis import Diagnosis
 from dcdrw_msgs_py.messages import PhaseSampleReader
-from dcdrw_msgs_py.node import Parameters, advertise, listen_aged, publish_diagnosis, run, steady_clock
+from dcdrw_msgs_py.node import Parameters, advertise, clock_ns, listen_aged, publish_diagnosis, run, steady_clock
 from dcdrw_msgs_py.samples import PhaseSample
 from dcdrw_msgs_py.topics import (
     COUPLER_FORCE_COMMAND,
@@ -110,7 +110,7 @@ class SynchronizerNode(Node):
         """See what no sample tells."""
         if self.count_publishers(self._effort.topic_name) > 1:
             self._core.conflict('second publisher')
-        now = self.get_clock().now().nanoseconds
+        now = clock_ns(self)
         if now < self._last_clock:
             self._core.conflict('clock')
         self._last_clock = now
@@ -126,7 +126,7 @@ class SynchronizerNode(Node):
         return response
 
     def _diagnose(self) -> Diagnosis:
-        now_ns = self.get_clock().now().nanoseconds
+        now_ns = clock_ns(self)
         stamp = self._command.stamp_ns
         age = (now_ns - stamp) * 1e-9 if stamp else math.nan
         return diagnose_synchronizer(self._core, self._command, age)

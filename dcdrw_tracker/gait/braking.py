@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dcdrw_msgs_py.rolling import speed_kept
 from dcdrw_msgs_py.values import Floats
 
 PLACES = 36
@@ -140,8 +141,8 @@ def doubt(time: Floats, psi: Floats, alpha: float) -> Doubt | None:
 
 
 def _plain_loss(pitch: float) -> float:
-    """The part of its speed that a plain wheel loses by a strike (paper's (15))."""
-    return 1.0 - math.cos(pitch)
+    """The part of its speed that a plain wheel loses by a strike."""
+    return 1.0 - speed_kept(0.5 * pitch)
 
 
 def _enough(time: Floats, psi: Floats, pitch: float) -> tuple[Floats, Floats]:
@@ -238,7 +239,7 @@ def _loss(time: Floats, psi: Floats, pitch: float, at: float) -> tuple[float, fl
 def _roughness(time: Floats, psi: Floats, pitch: float, at: float) -> float:
     """The variance that polynomials in time leave of the motion, one from each of these places to the next [rad²]."""
     step = np.floor((psi - at) / pitch)
-    begins = np.flatnonzero(np.diff(step))[:] + 1  # the first step is not whole, nor is the last
+    begins = np.flatnonzero(np.diff(step)) + 1  # the first step is not whole, nor is the last
     if len(begins) < 2:
         return math.nan
     counts = np.diff(begins)

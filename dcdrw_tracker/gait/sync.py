@@ -333,7 +333,7 @@ class SyncMonitor:
         params, strikes = self.params, self._steps + front
         if phase.resolution or self._resolution:
             self._resolution = round(100.0 * phase.resolution, 6)
-            self._stray = max(NOISE_SPAN * math.sqrt(self._noise2), self._resolution)
+            self._reckon_stray()
         edge = params.band_percent + ROUNDING
         if self._since <= self._steps:  # a whole step, or more, in the band
             edge += min(params.band_hysteresis_percent, self._stray)
@@ -408,6 +408,9 @@ class SyncMonitor:
         if not low <= error <= high:
             self._swing = min(low, error), max(high, error)
 
+    def _reckon_stray(self) -> None:
+        self._stray = max(NOISE_SPAN * math.sqrt(self._noise2), self._resolution)
+
     @property
     def _surprise(self) -> float:
         """How far from where its rates take it an error is wild [%]."""
@@ -425,7 +428,7 @@ class SyncMonitor:
         if noise2 <= SURPRISE * SURPRISE:
             self._watched = min(self._watched + dt, NOISE_MEMORY)
             self._noise2 += (noise2 - self._noise2) * min(dt / self._watched, 1.0)
-            self._stray = max(NOISE_SPAN * math.sqrt(self._noise2), self._resolution)
+            self._reckon_stray()
 
     def _judge(self, foretold: float, is_wild: bool, dt: float, edge: float) -> None:
         """Hold the error against the band: that which its past and rate foretell, drawn as far as noise explains.

@@ -16,7 +16,17 @@ from dcdrw_msgs_py.diagnosis import Diagnosis, Level, contested
 from dcdrw_msgs_py.frame import Frame
 from dcdrw_msgs_py.image_messages import camera, compressed_frame, frame, image_message, pose, tag_message
 from dcdrw_msgs_py.messages import JointSampleWriter, run_message
-from dcdrw_msgs_py.node import Age, Parameters, advertise, listen, publish_diagnosis, publishers, run, steady_clock
+from dcdrw_msgs_py.node import (
+    Age,
+    Parameters,
+    advertise,
+    clock_ns,
+    listen,
+    publish_diagnosis,
+    publishers,
+    run,
+    steady_clock,
+)
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND, JointSample
 from dcdrw_msgs_py.tagging import TagParams, mounts
@@ -149,7 +159,7 @@ class TagTrackerNode(Node):
         def play() -> None:  # so that nobody misses the beginning
             if self._joint_states.get_subscription_count():
                 timer.cancel()
-                reader.play(video, self.get_clock().now().nanoseconds)
+                reader.play(video, clock_ns(self))
 
         reader, timer = self._reader, self.create_timer(WAIT_SECONDS, play, clock=steady_clock())
 
