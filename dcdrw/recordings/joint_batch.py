@@ -1,5 +1,6 @@
 """JointState messages as they came off the wire (CDR), decoded many at once: numpy alone, no ROS."""
 
+import math
 import struct
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -26,6 +27,10 @@ class JointBatch(NamedTuple):
     """When the recorder got each; empty where that is not known."""
     run: NDArray[np.int64] = np.empty(0, np.int64)
     """The source's run of each; empty where it told none."""
+    unstamped: int = 0
+    """How many have the time of recording in the place of a stamp that told none."""
+    pace: float = math.nan
+    """How many times as fast time passes by the stamps as by the recording; NaN where that is not known."""
 
     @property
     def messages(self) -> int:

@@ -21,8 +21,6 @@ class LoneWheels:
         self._pairs = WheelPairs()
         self._joined: list[JointSample] = []
         self._log_ns: list[int] = []
-        self.unstamped = 0
-        """Messages without a stamp, to which the time of recording was given."""
         self.missing = ''
         """Which wheel the last message lacked, and what it names; or that the stamps of both never meet."""
         self._latest_ns: dict[str, int] = {}
@@ -38,7 +36,7 @@ class LoneWheels:
     def offset(self) -> float:
         """By how much later than the front wheel's the rear wheel's messages are recorded, by their stamps [s]."""
         (front_count, front), (rear_count, rear) = self._delays.values()
-        return rear - front if front_count and rear_count and not self.unstamped else 0.0
+        return rear - front if front_count and rear_count else 0.0
 
     def belongs(self, batch: JointBatch) -> bool:
         """Whether a batch has just one of the wheels."""
@@ -62,9 +60,6 @@ class LoneWheels:
             mean += float(((batch.log_ns - batch.stamp_ns) / SECOND - mean).sum()) / count
             self._delays[name] = count, mean
         for (stamp_ns, angle, rate), log_ns in zip(rows, times, strict=True):
-            if stamp_ns == 0 and log_ns:
-                stamp_ns = log_ns
-                self.unstamped += 1
             joined = self._pairs.take(LoneWheel(stamp_ns, self._names[name], Turn(float(angle), float(rate))))
             self._joined += joined
             self._log_ns += [log_ns] * len(joined)

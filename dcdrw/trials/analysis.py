@@ -5,6 +5,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import chain
+from statistics import median_low
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,8 +31,6 @@ from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseStatus
 from dcdrw_tracker.gait.rest import moves
 from dcdrw_tracker.gait.sync import SyncMonitor, SyncStatus
 
-FEWER = 100
-"""A source whose stamps advance so many times less than the time in which it is recorded has none."""
 LEARNED = 100
 """Samples after which the estimator knows their cadence."""
 
@@ -86,6 +85,8 @@ class Analysis(NamedTuple):
     """What the strikes say against zeros and spokes; not looked for where other parameters seem wrong."""
     wheels_apart: float = 0.0
     """By how much later the rear wheel's own messages were recorded than the front wheel's, by their stamps [s]."""
+    pace: float = math.nan
+    """How many times as fast time passed by the stamps as by the recording; NaN where that is not known."""
     damage: tuple[str, ...] = ()
     """What of the recording was left out, for it is damaged."""
     notes: tuple[str, ...] = ()
@@ -197,10 +198,13 @@ class _Trial:
         self._before = self._estimator.status().cadence
         self._last: PhaseSample | None = None
         self._unreadable = ''
-        self._slow_stamps = False
+        self._paces: list[float] = []
 
     def take(self, batch: JointBatch) -> None:
         """Feed one batch through both cores; wheels in messages of their own are joined first."""
+        self._estimator.note_unstamped(batch.unstamped)
+        if not math.isnan(batch.pace):
+            self._paces.append(batch.pace)
         if self._lone.belongs(batch):
             joined = self._lone.take(batch)
             if joined:
@@ -219,7 +223,6 @@ class _Trial:
                 self._estimator.note_foreign(batch.messages)
             self._unreadable = error
             return
-        batch = self._dated(batch)
         front, rear = batch.names.index(joints.front_joint), batch.names.index(joints.rear_joint)
         columns = (
             batch.stamp_ns,
@@ -250,22 +253,6 @@ class _Trial:
                 np.array(verdicts, bool),
             ]
         )
-
-    def _dated(self, batch: JointBatch) -> JointBatch:
-        """The same with the time of recording in place of missing stamps: zero while the wheels turn.
-
-        Stamps that then stand still, or run so much slower than the recording, are as good as missing: they are in
-        other units, milliseconds say, or too coarse.
-        """
-        if not len(batch.log_ns) or not np.ptp(batch.position, axis=0).any():
-            return batch
-        if np.ptp(batch.log_ns) > SECOND:
-            self._slow_stamps |= FEWER * int(np.ptp(batch.stamp_ns)) < int(np.ptp(batch.log_ns))
-        missing = np.full(batch.messages, True) if self._slow_stamps else batch.stamp_ns == 0
-        if np.count_nonzero(missing) < 2 or not np.ptp(batch.position[missing], axis=0).any():
-            return batch
-        self._estimator.note_unstamped(int(np.count_nonzero(missing)))
-        return batch._replace(stamp_ns=np.where(missing, batch.log_ns, batch.stamp_ns))
 
     def _follow(
         self, columns: list[list[Any]]
@@ -349,7 +336,6 @@ class _Trial:
             self._estimator.refuse('unpaired', self._lone.unpaired)
         if self._lone.missing and not self._course.rows:
             self._unreadable = self._lone.missing
-        self._estimator.note_unstamped(self._lone.unstamped)
         course = self._course
         motion = course.motion
         estimator = self._estimator.status()
@@ -372,6 +358,7 @@ class _Trial:
             joint_states=self._received,
             unreadable=self._unreadable,
             wheels_apart=self._lone.offset,
+            pace=median_low(self._paces) if self._paces else math.nan,
         )
 
 

@@ -15,6 +15,8 @@ from dcdrw_msgs_py.words import by_count, counted
 from dcdrw_tracker.gait.diagnostics import REFUSALS, coarseness, hints_in_words
 from dcdrw_tracker.gait.phase import Restart
 
+ANOTHER_PACE = 1.25
+"""Stamps that pass so many times as fast as the recording, or as slowly, go by another clock; no delay does that."""
 MANY_DISBELIEVED = 0.1
 """The share of the samples from which on it is said that their speeds are not used; fewer lie around gaps."""
 
@@ -87,6 +89,9 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         yield Remark(
             f'{counted(estimator.unstamped, "joint state")} had no stamp of use: the time of recording took its place.'
         )
+    if not 1.0 / ANOTHER_PACE <= trial.pace <= ANOTHER_PACE and not math.isnan(trial.pace):
+        stalled = trial.state is PairState.STALLED  # which time alone tells
+        yield Remark(f'Time passed {trial.pace:.3g} times as fast by the stamps as by the recording.', stalled)
     if estimator.foreign:
         yield Remark(
             f'{counted(estimator.foreign, "message")} {by_count(estimator.foreign, "names", "name")} neither wheel, '

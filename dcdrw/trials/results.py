@@ -8,6 +8,7 @@ from typing import Any
 from dcdrw.console import Bar
 from dcdrw.drawings.figure_files import figure_files
 from dcdrw.files import Table, table_file, to_json, write_csv, write_text, write_whole
+from dcdrw.recordings.dating import dated
 from dcdrw.recordings.derived_joints import derived_joints, joint_topic
 from dcdrw.recordings.joint_batch import JointBatch
 from dcdrw.recordings.leg_recording import is_walked
@@ -62,7 +63,8 @@ def read_trial(
             params = read_parameter_file(rig, params, space)
         comparison = Comparison(recording, phi_pitch(params.sync.front, params.sync.rear), space)
         clock = Clock()
-        trial = analyze(clock.watch(batches), params, [*sinks, comparison], rolls=not is_walked(recording, space))
+        states = clock.watch(dated(batches, params.phase))
+        trial = analyze(states, params, [*sinks, comparison], rolls=not is_walked(recording, space))
         if trial.unreadable and not len(trial.motion.stamp_ns):
             mend = (
                 ' (front_joint and rear_joint in a rig file name them)' if trial.unreadable.startswith('joint') else ''
@@ -153,8 +155,8 @@ def _joint_states(
     if derived:
         return derived
     found = joint_topic(recording, topic, namespace)
-    batches = with_runs(recording.joints(found), recorded_runs(recording, found.name))
-    return found.name, _shown(batches, recording.count(found))
+    batches = _shown(recording.joints(found), recording.count(found))
+    return found.name, with_runs(batches, recorded_runs(recording, found.name))
 
 
 def _shown(batches: Iterator[JointBatch], total: int) -> Iterator[JointBatch]:

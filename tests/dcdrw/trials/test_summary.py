@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from dcdrw.recordings.dating import dated
 from dcdrw.suite.parameter_file import TrialParams
 from dcdrw.trials.analysis import Analysis, analyze
 from dcdrw.trials.results import write_results
@@ -300,14 +301,24 @@ def test_a_clock_that_was_set_is_said_and_costs_nothing():
     assert summary.duration_s == pytest.approx(20.0, abs=0.1)
 
 
-@pytest.mark.parametrize('unit', [1000, 1_000_000])
-def test_stamps_in_other_units_give_way_to_the_time_of_recording(unit):
+def test_stamps_that_tell_no_time_are_said_and_cost_nothing():
     whole = batch(WALK)
-    summary = summarize(analyze([whole._replace(stamp_ns=whole.stamp_ns // unit)], TrialParams()))
+    params = TrialParams()
+    summary = summarize(analyze(dated([whole._replace(stamp_ns=whole.stamp_ns // 1000)], params.phase), params))
     assert summary.complete
     assert summary.samples.unstamped == len(WALK)
     assert f'{len(WALK)} joint states had no stamp of use: the time of recording' in summary.sentence
     assert summary.steps_to_synchronization == summarize(trial(WALK)).steps_to_synchronization
+
+
+@pytest.mark.parametrize('pace', [0.5, 2.0, 20.0])
+def test_stamps_that_pass_at_another_pace_are_said(pace):
+    """By which wheels may seem to stall."""
+    whole, params = batch(WALK), TrialParams()
+    stamps = ((whole.stamp_ns - whole.stamp_ns[0]) * pace).astype(np.int64)
+    summary = summarize(analyze(dated([whole._replace(stamp_ns=stamps)], params.phase), params))
+    assert f'Time passed {pace:g} times as fast by the stamps as by the recording.' in summary.sentence
+    assert summary.complete == (summary.state is PairState.SYNCHRONIZED) == (pace < 20.0)
 
 
 @pytest.mark.parametrize('size', [2, 3, 4, 7])
@@ -391,15 +402,6 @@ def test_a_clock_that_is_set_again_and_again_is_told_once():
     assert len(summary.samples.clock_steps) == 4
     assert summary.sentence.count('The clock of the source was set') == 1
     assert 'by -0.9 s to -0.9 s, 4 times, while' in summary.sentence
-
-
-@pytest.mark.parametrize('stamp_ns', [0, SECOND, 1_700_000_000 * SECOND])
-def test_stamps_that_stand_still_while_the_wheels_turn_are_none(stamp_ns):
-    samples = rolled(RATE)
-    recorded = batch(samples)
-    still = recorded._replace(stamp_ns=np.full_like(recorded.stamp_ns, stamp_ns))
-    summary = summarize(analyze([still], TrialParams()))
-    assert (summary.steps_to_synchronization, summary.samples.unstamped) == (38, len(samples))
 
 
 @pytest.mark.parametrize('rates', [True, False])
