@@ -324,8 +324,8 @@ class _Trial:
     def _cadence(self) -> CadenceStatus:
         """The estimator's gaps since the wheels were let go."""
         now, before = self._estimator.status().cadence, self._before
-        gaps, longest_ns = now.gaps - before.gaps, self._course.longest_ns
-        return CadenceStatus(now.rate, gaps, now.lost - before.lost, longest_ns * 1e-9 if gaps else 0.0)
+        gaps, lost = (max(count, 0) for count in (now.gaps - before.gaps, now.lost - before.lost))
+        return CadenceStatus(now.rate, gaps, lost, self._course.longest_ns * 1e-9 if gaps else 0.0)
 
     def result(self) -> Analysis:
         """All that there is."""

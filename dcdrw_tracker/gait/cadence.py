@@ -1,6 +1,7 @@
 """Cadence: the period of a stream, learned from its stamps, and the gaps in it."""
 
 import math
+from bisect import bisect_right
 from itertools import accumulate, pairwise
 from statistics import median_low
 from typing import NamedTuple
@@ -15,6 +16,14 @@ TOGETHER = 0.25
 """Samples of one burst are closer than this share of the time from burst to burst."""
 BURSTS = 3
 """So many bursts must look alike before they are taken for bursts."""
+CHANGED = 15
+"""So many long or short intervals in a row, all alike, are another cadence."""
+MANY_LONG = 12
+"""So many intervals that seem to be gaps tell of a source that is uneven, where they make up for one another."""
+COMMON = 0.95
+"""The share of the intervals of an uneven source that tells its longest and its shortest."""
+NEAR = 0.25
+"""So near whole periods, by the share of one, intervals lie between which samples were lost."""
 
 
 class CadenceStatus(NamedTuple):
@@ -43,7 +52,12 @@ class _Beat(NamedTuple):
     alone: bool = False
     """The source surely sends one by one."""
     apart_ns: float = 0.0
-    """The longest time from burst to burst, where they are of various sizes."""
+    """The longest time from burst to burst, where they are of various sizes, or from sample to uneven sample."""
+
+    @property
+    def gap_ns(self) -> float:
+        """A longer time from burst to burst is a gap."""
+        return GAP * max(self.period_ns, self.apart_ns)
 
     @property
     def sample_ns(self) -> float:
@@ -55,7 +69,8 @@ class Cadence:
     """Learns the period of a stream and counts its gaps; the samples' stamps are its only clock.
 
     A source that reads its sensor in bursts, and stamps the samples as they arrive, is told from one that loses
-    samples: its intervals are of two kinds, far apart, and its bursts come evenly.
+    samples: its intervals are of two kinds, far apart, and its bursts come evenly. Likewise one whose intervals are
+    uneven: they make up for one another, or are no whole periods. One that changes its rate keeps to the new one.
     """
 
     def __init__(self) -> None:
@@ -70,6 +85,8 @@ class Cadence:
         """Samples that arrive together: 1 where they come one by one."""
         self._intervals: list[int] = []
         self._counts: tuple[int, ...] = LEARNING_COUNTS
+        self._others = 0
+        """How many intervals in a row, all alike, have been far longer or shorter than the period."""
 
     def tick(self, stamp_ns: int) -> None:
         """Take the next stamp; one that does not move on is ignored."""
@@ -83,18 +100,27 @@ class Cadence:
         self._last_ns = stamp_ns
         intervals = self._intervals
         intervals.append(interval)
+        beat = self._beat
+        if beat and beat.size == 1.0:
+            if beat.period_ns <= GAP * interval and interval <= beat.gap_ns:
+                self._others = 0
+            else:
+                self._others = self._others + 1 if self._others and _alike(interval, intervals[-2]) else 1
+                if self._others == CHANGED:
+                    self._change()
+        else:
+            self._others = 0
         if len(intervals) in self._counts:
-            self._beat = beat = _learned(intervals, self._beat)
-            self.period_ns, self.burst = round(beat.sample_ns), round(beat.size)
+            self._learn(self._beat)
             if len(intervals) == LEARNING_COUNTS[-1]:
-                self._settle()
+                self._settle(self._others)
                 self._counts = LEARNING_COUNTS[-1:]
 
     def jump(self, stamp_ns: int) -> None:
         """Go on from another stamp, without a gap: the source has started anew."""
         self._settle()
         self._intervals.clear()
-        self._last_ns, self._before_ns = stamp_ns, 0
+        self._last_ns, self._before_ns, self._others = stamp_ns, 0, 0
 
     def seconds(self, elapsed: float) -> float:
         """The time in which the source turned on from one sample to the next [s], by that between their stamps.
@@ -109,7 +135,7 @@ class Cadence:
     def is_gap(self, elapsed: float) -> bool:
         """Whether so much time [s] between two samples is more than the source takes from one to the next."""
         beat = self._beat
-        return beat is not None and elapsed * 1e9 > GAP * max(beat.period_ns, beat.apart_ns)
+        return beat is not None and elapsed * 1e9 > beat.gap_ns
 
     def status(self) -> CadenceStatus:
         """A snapshot."""
@@ -117,13 +143,28 @@ class Cadence:
         rate = 1e9 * self._beat.size / self._beat.period_ns if self._beat else math.nan
         return CadenceStatus(rate, self._gaps + gaps, self._lost + lost, max(self._longest_ns, longest_ns) * 1e-9)
 
-    def _settle(self) -> None:
-        """Count the gaps so far for good, and keep the intervals of a burst that may not be complete."""
+    def _learn(self, known: _Beat | None) -> None:
+        self._beat = beat = _learned(self._intervals, known)
+        self.period_ns, self.burst = round(beat.sample_ns), round(beat.size)
+
+    def _change(self) -> None:
+        """Go on at the cadence of the last intervals."""
+        self._settle(CHANGED)
+        self._counts, self._others = LEARNING_COUNTS, 0
+        self._learn(None)
+
+    def _settle(self, others: int = 0) -> None:
+        """Count the gaps so far for good, and keep the intervals of a burst that may not be complete.
+
+        The last ones may be of another cadence: so many are kept, too.
+        """
+        kept = self._intervals[len(self._intervals) - others :]
+        del self._intervals[len(self._intervals) - others :]
         gaps, lost, longest_ns, rest, self._before_ns = self._judged()
         self._gaps += gaps
         self._lost += lost
         self._longest_ns = max(self._longest_ns, longest_ns)
-        self._intervals = rest
+        self._intervals = rest + kept
 
     def _judged(self) -> tuple[int, int, int, list[int], int]:
         """Gaps, lost samples, the longest gap [ns], the intervals of the last burst, and the time before it [ns]."""
@@ -131,7 +172,7 @@ class Cadence:
         if beat is None:
             return 0, 0, 0, intervals, 0
         gaps = lost = longest_ns = 0
-        period, inside, size, before = beat.period_ns, 0, 1, self._before_ns
+        period, gap_ns, inside, size, before = beat.period_ns, beat.gap_ns, 0, 1, self._before_ns
         various = beat.size > 1.0 and not beat.fixed
         first = 0
         for place, interval in enumerate(intervals):
@@ -146,12 +187,12 @@ class Cadence:
                     lost += max(round(before / beat.sample_ns) - size, 1)
                     longest_ns = max(longest_ns, before)
             else:
-                if between > GAP * period:
+                if between > gap_ns:
                     gaps += 1
                     lost += max(round(between * beat.size / period - max(size, beat.size)), 1)
                     longest_ns = max(longest_ns, interval)
                 if beat.fixed and place > size and size < beat.size:  # not the first, which may have begun before
-                    gaps += between <= GAP * period
+                    gaps += between <= gap_ns
                     lost += round(beat.size) - size
                     longest_ns = max(longest_ns, interval)
             before, inside, size, first = between, 0, 1, place + 1
@@ -169,7 +210,7 @@ def _learned(intervals: list[int], known: _Beat | None) -> _Beat:
     ratios = [later / earlier for earlier, later in pairwise(ordered)]
     widest = max(range(len(ratios)), key=ratios.__getitem__, default=0)
     if not ratios or ratios[widest] * TOGETHER < 1.0:
-        return one_by_one._replace(alone=len(intervals) >= SURE)
+        return (_rough(intervals, ordered) or one_by_one)._replace(alone=len(intervals) >= SURE)
     together = ordered[widest]
     if known and known.alone and together > 0.5 * known.period_ns:
         return known
@@ -191,7 +232,34 @@ def _learned(intervals: list[int], known: _Beat | None) -> _Beat:
         return beat
     if regular:
         return _Beat(period, size, together)
-    return known if known and known.size > 1.0 else one_by_one
+    return known if known and known.size > 1.0 else _rough(intervals, ordered) or one_by_one
+
+
+def _rough(intervals: list[int], ordered: list[int]) -> _Beat | None:
+    """The beat of a source that sends one by one, but at uneven intervals; None where those that are long are gaps.
+
+    Gaps last whole periods, and nothing makes up for them later.
+    """
+    count, period = len(ordered), median_low(ordered)
+    short = bisect_right(ordered, GAP * period)
+    long = ordered[short:]
+    if count < SURE or not long:
+        return None
+    usual = sum(ordered[:short]) / short
+    shortest, longest = ordered[round((1.0 - COMMON) * count)], ordered[round(COMMON * count) - 1]
+    common = [interval for interval in intervals if interval <= GAP * longest]
+    mean = sum(common) / len(common)
+    beat = _Beat(mean, apart_ns=longest)
+    if sum(abs(interval / usual - round(interval / usual)) <= NEAR for interval in long) < 0.75 * len(long):
+        return beat
+    strays = list(accumulate(interval - mean for interval in common))
+    made_up = len(long) >= MANY_LONG and max(strays) - min(strays) <= GAP * max(longest - shortest, period)
+    return beat if made_up else None
+
+
+def _alike(one: int, other: int) -> bool:
+    """Whether neither interval is far longer than the other."""
+    return one <= GAP * other and other <= GAP * one
 
 
 def _uneven(sizes: list[int], periods: list[int], together_ns: int) -> _Beat | None:

@@ -32,8 +32,6 @@ SURPRISE = 5.0
 """An error further than this from what its past and rate predict is motion, not noise [%]."""
 WILD = 2.0
 """And further than so many times what noise explains."""
-UNEVEN = 20.0
-"""By how much a third difference is more uneven, in the mean square, than the four values that it is made of."""
 SAME = 0.02
 """But for this share, a wheel's speeds before and after a strike must tell how far it turned."""
 ROUNDING = 1e-6
@@ -178,7 +176,7 @@ class SyncMonitor:
         self._noise2 = self._watched = 0.0
         self._stray = 0.0
         """How far noise, or the counts of coarse encoders, may carry the error from where it is [%]."""
-        self._differences = math.nan, math.nan
+        self._moves: deque[tuple[float, float]] = deque(maxlen=3)
         self._wild: float | None = None
         self._resolution = 0.0
         self._synchronized = self._lost = False
@@ -417,14 +415,15 @@ class SyncMonitor:
         return max(SURPRISE, WILD * self._stray)
 
     def _take_noise(self, moved: float, dt: float, is_smooth: bool) -> None:
-        """Measure noise by the third difference of the error: that of a motion seen evenly without a strike is none."""
+        """Measure noise by the third difference of the error: that of a motion seen without a strike is none."""
         if not is_smooth:
-            self._differences = math.nan, math.nan
+            self._moves.clear()
             return
-        first, second = self._differences
-        bent = moved - first
-        self._differences = moved, bent
-        noise2 = (bent - second) ** 2 / UNEVEN
+        moves = self._moves
+        moves.append((moved, dt))
+        if len(moves) < 3:
+            return
+        noise2 = _unevenness(*moves)
         if noise2 <= SURPRISE * SURPRISE:
             self._watched = min(self._watched + dt, NOISE_MEMORY)
             self._noise2 += (noise2 - self._noise2) * min(dt / self._watched, 1.0)
@@ -501,6 +500,19 @@ class _Turning(NamedTuple):
         """How far it has turned by a time since the first sample [steps]."""
         ahead = min(time, self.strikes[0]) if self.strikes else time
         return (self.before * ahead + self.after * (time - ahead)) / self.pitch
+
+
+def _unevenness(one: tuple[float, float], two: tuple[float, float], three: tuple[float, float]) -> float:
+    """The mean square of the noise of four values, by how far each of them moves, in what time, from the one before.
+
+    By their third divided difference, and how noise adds up in it: at even intervals, twentyfold in the mean square.
+    """
+    (move1, dt1), (move2, dt2), (move3, dt3) = one, two, three
+    early, late, whole = dt1 + dt2, dt2 + dt3, dt1 + dt2 + dt3
+    slope = move2 / dt2
+    difference = (move3 / dt3 - slope) / late - (slope - move1 / dt1) / early
+    weights = whole / (dt1 * dt2 * late), whole / (early * dt2 * dt3), 1.0 / (dt1 * early), 1.0 / (late * dt3)
+    return difference * difference / sum(weight * weight for weight in weights)
 
 
 def _strikes(last: Turn, now: Turn, dt: float, alpha: float) -> int | None:

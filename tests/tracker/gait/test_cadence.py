@@ -1,11 +1,12 @@
 import math
 import random
+from itertools import accumulate
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dcdrw_tracker.gait.cadence import LEARNING_COUNTS, Cadence
+from dcdrw_tracker.gait.cadence import Cadence
 
 MS = 1_000_000
 
@@ -33,10 +34,6 @@ def test_gaps_are_counted_and_the_lost_samples_told() -> None:
     assert status.longest == pytest.approx(0.030)
 
 
-def test_lost_samples_do_not_spoil_the_period() -> None:
-    assert tick([5 * sample for sample in range(400) if sample % 4]).status().rate == pytest.approx(200.0)
-
-
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**32), st.floats(0.0, 0.3))
 def test_every_sample_lost_at_random_is_counted(seed: int, share: float) -> None:
@@ -50,10 +47,44 @@ def test_jitter_is_no_gap() -> None:
     assert tick([10 * sample + (sample % 3) for sample in range(300)]).status().gaps == 0
 
 
-def test_a_source_that_slows_down_makes_gaps_only_until_it_is_known() -> None:
-    cadence = tick([*range(0, 100, 5), *range(100, 2000, 20)])
-    assert cadence.status().rate == pytest.approx(50.0)
-    assert cadence.status().gaps <= LEARNING_COUNTS[-1]
+@pytest.mark.parametrize('before', [20, 233, 1000])
+@pytest.mark.parametrize('rates', [(200.0, 50.0), (50.0, 1000.0), (200.0, 100.0, 200.0), (1000.0, 10.0)])
+def test_another_rate_is_no_gap(rates: tuple[float, ...], before: int) -> None:
+    stamps = [0.0]
+    for rate in rates:
+        stamps += [stamps[-1] + 1000.0 / rate * sample for sample in range(1, before)]
+    status = tick(stamps).status()
+    assert (status.gaps, status.lost) == (0, 0)
+    assert status.rate == pytest.approx(rates[-1])
+
+
+def test_what_is_lost_before_and_after_another_rate_is_counted() -> None:
+    slow = [2000.0 + 20.0 * sample for sample in range(200) if sample != 100]
+    status = tick([*(5.0 * sample for sample in range(400) if sample not in (390, 391)), *slow]).status()
+    assert (status.gaps, status.lost) == (2, 3)
+
+
+@pytest.mark.parametrize('pattern', [(5, 15), (5, 5, 10), (5, 5, 5, 5, 10), (4, 11, 6, 12), (15, 16, 16, 31)])
+def test_intervals_that_make_up_for_one_another_are_no_gaps(pattern: tuple[int, ...]) -> None:
+    intervals = pattern * (1000 // len(pattern))
+    stamps = [float(stamp) for stamp in accumulate(intervals, initial=0)]
+    status = tick(stamps).status()
+    assert (status.gaps, status.lost) == (0, 0)
+    assert status.rate == pytest.approx(1000.0 * len(intervals) / sum(intervals), rel=0.02)
+    status = tick([stamp for stamp in stamps if not 2000.0 < stamp < 2300.0]).status()
+    assert (status.gaps, status.longest) == (1, pytest.approx(0.3, abs=0.03))
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**32), st.booleans())
+def test_intervals_as_it_happens_are_no_gaps(seed: int, on_time: bool) -> None:
+    """Half as long again or half as long, each by itself or by when it should end."""
+    jitter = random.Random(seed)
+    late = [jitter.uniform(-5.0, 5.0) for _ in range(1000)]
+    stamps = [10.0 * sample + (late[sample] if on_time else sum(late[:sample])) for sample in range(1000)]
+    status = tick(stamps).status()
+    assert (status.gaps, status.lost) == (0, 0)
+    assert status.rate == pytest.approx(100.0, rel=0.1)
 
 
 def test_a_jump_of_the_source_is_no_gap() -> None:
