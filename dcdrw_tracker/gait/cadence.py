@@ -243,14 +243,15 @@ def _rough(intervals: list[int], ordered: list[int]) -> _Beat | None:
     count, period = len(ordered), median_low(ordered)
     short = bisect_right(ordered, GAP * period)
     long = ordered[short:]
-    if count < SURE or not long:
+    if count < SURE:
         return None
     usual = sum(ordered[:short]) / short
     shortest, longest = ordered[round((1.0 - COMMON) * count)], ordered[round(COMMON * count) - 1]
     common = [interval for interval in intervals if interval <= GAP * longest]
     mean = sum(common) / len(common)
     beat = _Beat(mean, apart_ns=longest)
-    if sum(abs(interval / usual - round(interval / usual)) <= NEAR for interval in long) < 0.75 * len(long):
+    whole = sum(abs(interval / usual - round(interval / usual)) <= NEAR for interval in long)
+    if not long or whole < 0.75 * len(long):
         return beat
     strays = list(accumulate(interval - mean for interval in common))
     made_up = len(long) >= MANY_LONG and max(strays) - min(strays) <= GAP * max(longest - shortest, period)
@@ -259,7 +260,7 @@ def _rough(intervals: list[int], ordered: list[int]) -> _Beat | None:
 
 def _alike(one: int, other: int) -> bool:
     """Whether neither interval is far longer than the other."""
-    return one <= GAP * other and other <= GAP * one
+    return one < GAP * other and other < GAP * one
 
 
 def _uneven(sizes: list[int], periods: list[int], together_ns: int) -> _Beat | None:
