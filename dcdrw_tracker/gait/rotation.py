@@ -13,6 +13,8 @@ SLOPE_WINDOW_NS = 50_000_000
 """Time over which a speed is taken that the source does not give."""
 LEAST_SLOPE_NS = 4_000_000
 """Over a shorter time a speed is none: samples of a burst are stamped as they arrive, one right after the other."""
+QUICKEST = 20.0
+"""No wheel gathers speed faster: twice what gravity gives one that falls [rad/s²]."""
 LEAST_COUNT = 1e-6
 """A finer encoder is none: rotations that are no multiples of a count [rad]."""
 LEAST_PACE = 0.05
@@ -134,18 +136,20 @@ class Rotation:
     def continued(self, angle: float, dt: float, tolerance: Tolerance) -> float | None:
         """The rotation ψ that a raw angle means, dt seconds on; None where no wheel gets there.
 
-        A wheel turns at most at `max_speed`, over a longer time at most at twice its pace and a step more, and
-        rocks back by a step at most. An angle out of this reach has wrapped, unless the source is known not to
-        wrap, or was silent for so long that it may as well have started anew. Over a silence, a source that is
-        known to wrap is taken to have kept its pace. So an unbounded rotation stays what it is, through any gap.
+        A wheel turns at most at `max_speed`, over a longer time at most at twice its pace and as far as it gathers
+        speed, from a quarter of a step to a whole one, and rocks back by as much. An angle out of this reach has
+        wrapped, unless the source is known not to wrap, or was silent for so long that it may as well have started
+        anew. Over a silence, a source that is known to wrap is taken to have kept its pace. So an unbounded rotation
+        stays what it is, through any gap.
         """
         moved = angle - self._raw
         slack = 2.0 * tolerance.hysteresis
         if not self._wraps and -slack <= moved <= slack:  # in reach of any wheel: the rule, at a fast rate
             return angle + self._offset
-        fastest = tolerance.max_speed * dt
-        along = min(fastest, 2.0 * self.speed * dt + self.pitch) + slack
-        against = min(fastest, self.pitch) + slack
+        fastest = tolerance.max_speed * dt + slack
+        more = min(max(0.5 * self.alpha, slack) + 0.5 * QUICKEST * dt * dt, self.pitch + slack)
+        along = min(fastest, 2.0 * self.speed * dt + more)
+        against = min(fastest, more)
         low, high = (-against, along) if self.pace >= 0.0 else (-along, against)
         lost = 0.0
         whole = -math.tau * round((moved - self.pace * dt) / math.tau)

@@ -527,3 +527,17 @@ def test_encoders_of_both_wheels_with_another_gear_are_asked_about():
         ('front.spokes', pytest.approx(6.0)),
         ('rear.spokes', pytest.approx(6.0)),
     ]
+
+
+@pytest.mark.parametrize('glitch', [-1.0, 0.2, 0.3, 0.5])
+def test_wild_samples_of_a_camera_are_refused_and_cost_no_step(glitch):
+    """At 60 Hz, within reach of the fastest wheel, but not of one that rolls as it did."""
+    samples = rolled(60)
+    wild = [
+        one._replace(front=one.front._replace(angle=one.front.angle + glitch)) if i % 97 == 50 else one
+        for i, one in enumerate(samples)
+    ]
+    summary = summarize(trial(wild))
+    assert (summary.steps_to_synchronization, summary.judged_from_s) == (38, 0.0)
+    assert summary.samples.refused == {'outlier': len(samples) // 97}
+    assert not summary.complete
