@@ -279,7 +279,7 @@ class _Trial:
             for place, one in places:
                 if clock_ns:
                     one = one._replace(stamp_ns=one.stamp_ns - clock_ns)
-                if not self._moving and moves(one):
+                if not self._moving and self._goes(one):
                     self._let_go(place, len(taken))
                 sync = self._monitor.update(one)
                 if self._is_held:
@@ -298,6 +298,10 @@ class _Trial:
                 self._course.footfalls.extend(footfalls)
         self._received += len(columns[0])
         return taken, phases, errors, verdicts, clocks
+
+    def _goes(self, phase: PhaseSample) -> bool:
+        """Whether the wheels are let go: by their speeds, or while these are not known, by how far they turned."""
+        return moves(phase) or (math.isnan(phase.front.rate) and not self._is_held)
 
     def _let_go(self, row: int, taken: int) -> None:
         self._moving = True

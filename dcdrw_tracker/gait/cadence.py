@@ -6,17 +6,17 @@ from itertools import accumulate, pairwise
 from statistics import median_low
 from typing import NamedTuple
 
-LEARNING_COUNTS = (2, 5, 15, 60, 240)
+LEARNING_COUNTS = (2, 5, 15, 60, 240, 960)
 """Numbers of intervals after which the period is learned; after the last, it is learned anew."""
-SURE = 60
-"""So many intervals that are alike tell a source that sends one by one from the inside of a burst."""
+SURE, SURE_NS = 60, 50_000_000
+"""So many intervals that are alike, over so long, tell a source that sends one by one from the inside of a burst."""
 GAP = 1.5
 """An interval longer than this many periods is a gap."""
 TOGETHER = 0.25
 """Samples of one burst are closer than this share of the time from burst to burst."""
 BURSTS = 3
 """So many bursts must look alike before they are taken for bursts."""
-CHANGED = 15
+CHANGED = 20
 """So many long or short intervals in a row, all alike, are another cadence."""
 MANY_LONG = 12
 """So many intervals that seem to be gaps tell of a source that is uneven, where they make up for one another."""
@@ -210,7 +210,9 @@ def _learned(intervals: list[int], known: _Beat | None) -> _Beat:
     ratios = [later / earlier for earlier, later in pairwise(ordered)]
     widest = max(range(len(ratios)), key=ratios.__getitem__, default=0)
     if not ratios or ratios[widest] * TOGETHER < 1.0:
-        return (_rough(intervals, ordered) or one_by_one)._replace(alone=len(intervals) >= SURE)
+        return (_rough(intervals, ordered) or one_by_one)._replace(
+            alone=len(intervals) >= SURE and sum(intervals) >= SURE_NS
+        )
     together = ordered[widest]
     if known and known.alone and together > 0.5 * known.period_ns:
         return known

@@ -39,6 +39,8 @@ REMEMBERED = 100
 """Restarts and clock steps of which the particulars are kept."""
 LEAST_CLOCK_STEP_NS = 200_000_000
 """A jump of the stamps by less is as good as a gap."""
+BURSTS_NS = 1_000_000_000
+"""So soon after the start, stamps that jump may be those of bursts that are not known yet."""
 MANY_SLOW = 5
 """So many strikes, and no other, of wheels that turn slower than any that rolls by itself make the unit doubtful."""
 MOVING = 0.2
@@ -209,7 +211,7 @@ class PhaseEstimator:
         """Start afresh with the next sample (n = 0); the counts of samples stay."""
         self._last: JointSample | None = None
         self._held: list[_Held] = []
-        self._clock_ns = self._arrived_ns = 0
+        self._clock_ns = self._arrived_ns = self._begun_ns = 0
         self._front = self._rear = Rotation(self.params.front.alpha, 0, 0.0, math.nan, self._tolerance)
         self._n_uncertain = False
         if self._is_fine:  # what starts may have other encoders; one whose counts seem to be jumps is learned on
@@ -386,6 +388,8 @@ class PhaseEstimator:
         slowest = min(abs(self._front.pace), abs(self._rear.pace))
         if not period_ns or elapsed_ns <= 10 * period_ns or slowest * elapsed_ns < 4e9 * self._tolerance.hysteresis:
             return False
+        if joints.stamp_ns - self._begun_ns < BURSTS_NS or not self._cadence.is_gap(elapsed_ns * 1e-9):
+            return False
         paused_ns = arrival_ns - self._arrived_ns if self._arrived_ns and arrival_ns else elapsed_ns
         if (self._front.may_wrap or self._rear.may_wrap) and paused_ns > elapsed_ns // 2:
             return False
@@ -401,6 +405,7 @@ class PhaseEstimator:
 
     def _start(self, joints: JointSample) -> PhaseUpdate:
         params = self.params
+        self._begun_ns = joints.stamp_ns
         self._front, self._rear = (
             Rotation(shape.alpha, joints.stamp_ns, turn.angle, self._speed(turn), self._tolerance, zero)
             for shape, turn, zero in (

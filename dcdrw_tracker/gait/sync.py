@@ -201,14 +201,11 @@ class SyncMonitor:
             return None
         if restarts != last.restarts or not 0.0 < dt <= self.params.stale_after:
             return self._restart(phase)
-        front_strikes = _strikes(last.front, now_front, dt, self._front_alpha)
-        rear_strikes = _strikes(last.rear, now_rear, dt, self._rear_alpha)
-        if front_strikes is None or rear_strikes is None:
+        turned = self._turned(last, phase, dt)
+        if turned is None:
             return self._restart(phase)
-        if n - last.step_difference != front_strikes - rear_strikes and not _may_miss_strikes(last, phase, dt):
-            return self._restart(phase)
+        front_strikes, rear_strikes, dt = turned
         self._cadence.tick(stamp_ns)
-        dt = self._seconds(last, phase, front_strikes, rear_strikes, dt)
         if self._rest.update(phase):  # the time for which the wheels were held counts for no stall
             self._struck_ns = {FRONT: stamp_ns, REAR: stamp_ns}
         self._is_held = self._rest.held
@@ -221,16 +218,34 @@ class SyncMonitor:
         self._last = phase
         return self._sample(phase)
 
-    def _seconds(self, last: PhaseSample, now: PhaseSample, front: int, rear: int, dt: float) -> float:
-        """The time in which the wheels turned on [s]: that of the stamps, but within bursts, stamped as they arrive."""
+    def _turned(self, last: PhaseSample, now: PhaseSample, dt: float) -> tuple[int, int, float] | None:
+        """Strikes of both wheels between two samples, and the time in which they turned on [s]; None where none do so.
+
+        That is the time of the stamps, but within bursts, stamped as they arrive, the mean one, where it goes better
+        with the speeds.
+        """
         even = self._cadence.seconds(dt)
         if even == dt:
-            return dt
+            found = self._struck(last, now, dt)
+            return found and (*found[:2], dt)
+        told = [(*found, time) for time in (dt, even) if (found := self._struck(last, now, time))]
+        front, rear, _, time = min(told, key=lambda one: one[2], default=(0, 0, math.nan, math.nan))
+        return (front, rear, time) if told else None
+
+    def _struck(self, last: PhaseSample, now: PhaseSample, dt: float) -> tuple[int, int, float] | None:
+        """Strikes of both wheels within dt seconds, and how far from where their speeds have them they are [rad]."""
+        told = _told_steps(last, now)
+        front = _strikes(last.front, now.front, dt, self._front_alpha, told[0])
+        rear = _strikes(last.rear, now.rear, dt, self._rear_alpha, told[1])
+        if front is None or rear is None:
+            return None
+        if now.step_difference - last.step_difference != front - rear and not _may_miss_strikes(last, now, dt):
+            return None
         turned = abs(now.front.angle - last.front.angle + 2.0 * self._front_alpha * front) + abs(
             now.rear.angle - last.rear.angle + 2.0 * self._rear_alpha * rear
         )
         speed = 0.5 * sum(abs(rate) for rate in (last.front.rate, now.front.rate, last.rear.rate, now.rear.rate))
-        return even if abs(speed * even - turned) < abs(speed * dt - turned) else dt
+        return front, rear, abs(speed * dt - turned)
 
     @property
     def held(self) -> bool:
@@ -515,14 +530,22 @@ def _unevenness(one: tuple[float, float], two: tuple[float, float], three: tuple
     return difference * difference / sum(weight * weight for weight in weights)
 
 
-def _strikes(last: Turn, now: Turn, dt: float, alpha: float) -> int | None:
+def _told_steps(last: PhaseSample, now: PhaseSample) -> tuple[int | None, int | None]:
+    """The strikes of both wheels between two samples, where their source counts the steps."""
+    ahead = now.front_steps - now.rear_steps
+    if not (now.front_steps or now.rear_steps) or ahead != now.step_difference:
+        return None, None
+    return now.front_steps - last.front_steps, now.rear_steps - last.rear_steps
+
+
+def _strikes(last: Turn, now: Turn, dt: float, alpha: float, told: int | None) -> int | None:
     """Forward strikes of a wheel between two samples, negative for backward ones; None where no wheel moves so.
 
-    Its angle falls (rises) by 2α at each.
+    Its angle falls (rises) by 2α at each. As many as are told, or as go best with its speeds.
     """
     expected = _expected(last, now, dt)
     change = now.angle - last.angle
-    strikes = round((expected - change) / (2.0 * alpha))
+    strikes = round((expected - change) / (2.0 * alpha)) if told is None else told
     surprise = change + 2.0 * alpha * strikes - expected
     return strikes if abs(surprise) <= 0.5 * alpha + abs(expected) else None
 

@@ -335,6 +335,20 @@ def test_samples_in_bursts_give_the_same_verdict(size):
     assert summary.final_band_percent == pytest.approx(alone.final_band_percent, abs=0.1)
 
 
+@pytest.mark.parametrize(('rate', 'size'), [(200, 64), (1000, 100)])
+@pytest.mark.parametrize('rates', [True, False])
+def test_long_bursts_cost_no_step(rate, size, rates):
+    """Within which a wheel takes half a step: also before they are known, and without speeds."""
+    samples = rolled(rate)
+    last = [samples[min(i - i % size + size, len(samples)) - 1].stamp_ns for i in range(len(samples))]
+    flushed = [sample._replace(stamp_ns=last[i] + 20_000 * (i % size)) for i, sample in enumerate(samples)]
+    if not rates:
+        flushed = [one._replace(front=Turn(one.front.angle), rear=Turn(one.rear.angle)) for one in flushed]
+    summary = summarize(trial(flushed))
+    assert (summary.steps_to_synchronization, summary.remarks) == (38, ())
+    assert summary.initial_phase_percent == pytest.approx(21.6, abs=0.3)
+
+
 def test_joint_states_that_come_twice_cost_nothing():
     summary = summarize(trial([sample for sample in WALK for _ in range(2)]))
     assert (summary.samples.duplicates, summary.samples.refused, summary.complete) == (len(WALK), {}, True)
