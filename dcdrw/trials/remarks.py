@@ -12,7 +12,7 @@ from dcdrw_msgs_py.diagnosis import PairState
 from dcdrw_msgs_py.rig import FRONT, REAR
 from dcdrw_msgs_py.samples import SECOND
 from dcdrw_msgs_py.words import by_count, counted
-from dcdrw_tracker.gait.diagnostics import REFUSALS, coarseness, hints_in_words
+from dcdrw_tracker.gait.diagnostics import REFUSALS, coarseness, hints_in_words, rareness
 from dcdrw_tracker.gait.phase import Restart
 
 ANOTHER_PACE = 1.25
@@ -43,6 +43,8 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         yield Remark(_contradicted(one), True)
     if trial.status.too_coarse:
         yield Remark(_as_sentence(coarseness(trial.status)), True)
+    if trial.status.too_rare:
+        yield Remark(_as_sentence(rareness(trial.status)), True)
     shift = 100.0 * abs(trial.wheels_apart) * trial.status.steps / trial.seconds if trial.seconds > 0.0 else 0.0
     if shift >= trial.params.sync.band_percent:
         yield Remark(

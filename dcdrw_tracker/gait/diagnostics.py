@@ -47,6 +47,8 @@ def diagnose_sync(status: SyncStatus, age: float, stale_after: float) -> Diagnos
     level, message = _LEVELS.get(state, Level.OK), _message(state, status, age)
     if status.too_coarse and state is not PairState.NO_DATA:
         level, message = max(level, Level.WARN), f'{message}; {coarseness(status)}'
+    if status.too_rare and state is not PairState.NO_DATA:
+        level, message = max(level, Level.WARN), f'{message}; {rareness(status)}'
     low, high = status.swing_percent
     steps, latest = status.steps_to_synchronization, status.steps_at_latest
     return Diagnosis(
@@ -67,6 +69,7 @@ def diagnose_sync(status: SyncStatus, age: float, stale_after: float) -> Diagnos
             'initial phase [%]': 100.0 * status.initial_phase,
             CONTRACTION: status.contraction,
             'resolution of the error [%]': status.resolution_percent,
+            'samples in a step': status.samples_in_step,
             'lone wild samples': status.strays,
             'slipped steps': status.slips,
             'times synchronization was lost': status.losses,
@@ -116,6 +119,14 @@ def coarseness(status: SyncStatus) -> str:
     return (
         f'the encoders are too coarse for the band: a count of each leaves {status.resolution_percent:.3g} % of a step '
         'open (more counts in a turn would tell)'
+    )
+
+
+def rareness(status: SyncStatus) -> str:
+    """What is said of samples that are too rare to tell what the error does within a step."""
+    return (
+        f'the samples are too rare, {status.samples_in_step:.1f} in a step: the error may leave the band between two '
+        'of them (a higher rate would tell; 20 in a step are well)'
     )
 
 

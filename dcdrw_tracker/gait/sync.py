@@ -9,6 +9,7 @@ Noise is what the error does between strikes that no smooth motion does, whateve
 
 import math
 from collections import deque
+from statistics import fmean
 from typing import Annotated, NamedTuple
 
 from dcdrw_msgs_py.in_step import BAND_PERCENT, HOLD_STEPS, in_step_from, strikes_in_step, wrapped_percent
@@ -38,6 +39,10 @@ ROUNDING = 1e-6
 """An error that is further beyond the band's edge is not on it [%]: large rotations leave so much open."""
 FASTEST = 100.0
 """A speed beyond this is not a measurement [rad/s]."""
+FEWEST = 4.25
+"""Of fewer samples in a step, the extremes of the error lie between two of them."""
+LATEST_STEPS = 8
+"""So many steps tell how many samples there are in one."""
 LONG_WAY = 0.1
 """A wheel that turns further than this between two samples may strike unseen [rad]."""
 
@@ -130,9 +135,16 @@ class SyncStatus(NamedTuple):
     """How far coarse encoders leave the error open, a count of each [%]; 0 where the rotations are told finely."""
     too_coarse: bool = False
     """That is as much as the band: the error may seem to be outside or inside where it is not."""
+    samples_in_step: float = math.nan
+    """How many samples there are in a step of the front wheel, of late; NaN before the second step."""
     restarts: int = 0
     """How often the source has started anew."""
     cadence: CadenceStatus = CadenceStatus(math.nan, 0, 0, 0.0)
+
+    @property
+    def too_rare(self) -> bool:
+        """The error may leave the band from one sample to the next and be back: nobody knows whether it does."""
+        return self.samples_in_step < FEWEST
 
     @property
     def steps_text(self) -> str:
@@ -186,6 +198,8 @@ class SyncMonitor:
         self._swing = self._last_swing = math.nan, math.nan
         self._swings: list[tuple[float, float]] = []
         self._struck_ns = {FRONT: 0, REAR: 0}
+        self._step_ns: deque[float] = deque(maxlen=LATEST_STEPS)
+        self._samples_in_step = math.nan
 
     def update(self, phase: PhaseSample) -> SyncSample | None:
         """Take the next sample; None where an angle is none, or where the stamp is that of the last sample."""
@@ -210,6 +224,9 @@ class SyncMonitor:
             self._struck_ns = {FRONT: stamp_ns, REAR: stamp_ns}
         self._is_held = self._rest.held
         if front_strikes > 0:
+            if self._steps:
+                self._step_ns.append((stamp_ns - self._struck_ns[FRONT]) / front_strikes)
+                self._samples_in_step = fmean(self._step_ns) / max(self._cadence.period_ns, 1)
             self._struck_ns[FRONT] = stamp_ns
         if rear_strikes > 0:
             self._struck_ns[REAR] = stamp_ns
@@ -286,6 +303,7 @@ class SyncMonitor:
             stalled=self._stalled(last.stamp_ns),
             resolution_percent=self._resolution,
             too_coarse=self._resolution >= self.params.band_percent,
+            samples_in_step=self._samples_in_step,
             restarts=self._restarts,
             cadence=self._cadence.status(),
         )
@@ -477,8 +495,9 @@ class SyncMonitor:
         return wrapped_percent(phi / self._pitch)
 
     def _sample(self, phase: PhaseSample) -> SyncSample:
-        # Wheels that are held do not walk; whether a wild sample is alone is not known yet.
+        # Wheels that are held do not walk; whether a wild sample is alone is not known yet, nor is what none shows.
         synchronized = self._synchronized and not self._is_held and self._wild is None
+        synchronized &= not self._samples_in_step < FEWEST
         return SyncSample(phase.stamp_ns, self._error / 100.0 * self._pitch, self._error, synchronized)
 
 

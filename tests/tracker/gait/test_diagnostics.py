@@ -17,6 +17,7 @@ STATUS = SyncStatus(
     steps=12,
     swing_percent=(-3.0, 2.5),
     contraction=0.9,
+    samples_in_step=100.0,
     cadence=CadenceStatus(200.0, 2, 3, 0.02),
 )
 NEVER = math.inf
@@ -36,6 +37,7 @@ NEVER = math.inf
         (STATUS._replace(synchronized=True, steps_to_synchronization=7), 0.0, Level.OK, PairState.SYNCHRONIZED),
         (STATUS, 0.0, Level.OK, PairState.CONVERGING),
         (STATUS._replace(too_coarse=True), 0.0, Level.WARN, PairState.CONVERGING),
+        (STATUS._replace(samples_in_step=3.0), 0.0, Level.WARN, PairState.CONVERGING),
         (STATUS._replace(too_coarse=True), 2.5, Level.STALE, PairState.NO_DATA),
     ],
 )
@@ -80,6 +82,7 @@ def test_the_keys_of_the_contract_are_there_with_bare_numbers_and_the_unit_in_th
         'initial phase [%]': '21.6',
         'per-step convergence ratio': '0.9',
         'resolution of the error [%]': '0',
+        'samples in a step': '100',
         'lone wild samples': '0',
         'slipped steps': '0',
         'times synchronization was lost': '0',

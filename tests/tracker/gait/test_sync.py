@@ -274,3 +274,12 @@ def test_a_changed_band_takes_effect_at_once() -> None:
     monitor.configure(SyncParams(band_percent=0.01, band_hysteresis_percent=0.0))
     monitor.update(SETTLED[-1]._replace(stamp_ns=SETTLED[-1].stamp_ns + 5_000_000))
     assert not monitor.status().synchronized
+
+
+@pytest.mark.parametrize(('rate', 'too_rare'), [(4.0, True), (6.0, True), (9.0, False), (20.0, False)])
+def test_samples_that_are_too_rare_to_show_a_step_vouch_for_nothing(rate: float, too_rare: bool) -> None:
+    every = round(200.0 / rate)
+    monitor, syncs = run(SETTLED[::every])
+    assert monitor.status().samples_in_step == pytest.approx(STEP * 200.0 / every, rel=0.1)
+    assert monitor.status().too_rare == too_rare
+    assert any(sync.synchronized for sync in syncs) != too_rare
