@@ -181,6 +181,8 @@ _HINTS: dict[Hint, str] = {
     '(parameter rollover, which takes a start in its upper half for one below 0)',
     'lone_jump': "one wheel's rotation jumped alone: does its encoder's counter roll over? "
     '(parameter rollover, by how much)',
+    'stamps': "the stamps pass far faster or slower than this node's clock, or begin anew again and again: are they "
+    'whole, in seconds and nanoseconds? (of stamps that are all zero, the time of arrival counts)',
     'revolutions': 'the wheels turn slower than they can roll: are their rotations in revolutions? '
     '(parameter unit; of a film in slow motion, its frame rate)',
     'unit': 'the wheels turn faster than they can roll: are their rotations in degrees? '

@@ -24,7 +24,7 @@ is not a number, the stamp stands still, goes back or lies ahead of the clock, o
 Cause = Literal['announced', 'stamp', 'rotation']
 """Why the source is taken to have started anew: it says so, its stamps went back, or its rotations jumped."""
 
-Hint = Literal['front_sign', 'rear_sign', 'unit', 'revolutions', 'ratio', 'rollover', 'lone_jump']
+Hint = Literal['front_sign', 'rear_sign', 'stamps', 'unit', 'revolutions', 'ratio', 'rollover', 'lone_jump']
 """A parameter that is probably set wrongly, judged by how the wheels seem to turn."""
 
 LARGEST_ROTATION = 1e9
@@ -41,6 +41,10 @@ LEAST_CLOCK_STEP_NS = 200_000_000
 """A jump of the stamps by less is as good as a gap."""
 BURSTS_NS = 1_000_000_000
 """So soon after the start, stamps that jump may be those of bursts that are not known yet."""
+PASSED_NS, OTHER_UNIT = 2_000_000_000, 100
+"""Over so much of the node's time, stamps that pass so many times as fast or as slowly are in another unit."""
+OFTEN = 5
+"""So often no clock is set: the stamps lack a part."""
 MANY_SLOW = 5
 """So many strikes, and no other, of wheels that turn slower than any that rolls by itself make the unit doubtful."""
 MOVING = 0.2
@@ -194,7 +198,7 @@ class PhaseEstimator:
         self._refusal: Refusal | None = None
         self._accepted = self._unstamped = self._foreign = self._duplicates = self._too_fast = 0
         self._slow_strikes: int | None = 0
-        self._restarts = self._rolled_before = 0
+        self._restarts = self._rolled_before = self._now_ns = 0
         self._restarted: deque[Restart] = deque(maxlen=REMEMBERED)
         self._clock_steps: deque[ClockStep] = deque(maxlen=REMEMBERED)
         self._is_fine = True
@@ -211,7 +215,7 @@ class PhaseEstimator:
         """Start afresh with the next sample (n = 0); the counts of samples stay."""
         self._last: JointSample | None = None
         self._held: list[_Held] = []
-        self._clock_ns = self._arrived_ns = self._begun_ns = 0
+        self._clock_ns = self._arrived_ns = self._begun_ns = self._begun_now_ns = 0
         self._front = self._rear = Rotation(self.params.front.alpha, 0, 0.0, math.nan, self._tolerance)
         self._n_uncertain = False
         if self._is_fine:  # what starts may have other encoders; one whose counts seem to be jumps is learned on
@@ -248,7 +252,7 @@ class PhaseEstimator:
             arrival_ns: when the sample arrived, by whatever clock; 0: at `now_ns`.
 
         """
-        arrival_ns = arrival_ns or now_ns
+        self._now_ns, arrival_ns = now_ns, arrival_ns or now_ns
         if self._scaled:
             joints = joints._replace(
                 front=_scaled(joints.front, self._front_scale), rear=_scaled(joints.rear, self._rear_scale)
@@ -288,6 +292,8 @@ class PhaseEstimator:
             if stray is None or self._apart(joints, last) <= self._apart(joints, stray):
                 update = self._follow(joints, elapsed_ns * 1e-9)
                 if update:
+                    if arrival_ns - self._arrived_ns > PASSED_NS:  # a pause tells nothing of the clocks
+                        self._begun_ns, self._begun_now_ns = stamp_ns, now_ns
                     self._arrived_ns = arrival_ns
                     return update
             return self._hold(joints, 'outlier', arrival_ns)
@@ -334,8 +340,19 @@ class PhaseEstimator:
         self._is_fine = front.is_fine and rear.is_fine
         self._resolution = 0.5 * (front.count / self.params.front.alpha + rear.count / self.params.rear.alpha)
 
+    def _are_stamps_off(self) -> bool:
+        """Whether the stamps pass far faster or slower than the node's clock, or begin anew again and again."""
+        passed_ns = self._now_ns - self._begun_now_ns
+        if self._last is None or not self._begun_now_ns or passed_ns < PASSED_NS:
+            return False
+        told_ns = self._last.stamp_ns - self._begun_ns
+        is_other_unit = not passed_ns < OTHER_UNIT * told_ns < OTHER_UNIT * OTHER_UNIT * passed_ns
+        return is_other_unit or len(self._clock_steps) >= OFTEN
+
     def _hints(self) -> tuple[Hint, ...]:
         hints: list[Hint] = []
+        if self._are_stamps_off():
+            return ('stamps',)  # by which all else is judged
         swift = self.params.unit == 'rad' and any(
             abs(wheel.pace) > _fastest_rolling(shape)
             for wheel, shape in ((self._front, self.params.front), (self._rear, self.params.rear))
@@ -405,7 +422,7 @@ class PhaseEstimator:
 
     def _start(self, joints: JointSample) -> PhaseUpdate:
         params = self.params
-        self._begun_ns = joints.stamp_ns
+        self._begun_ns, self._begun_now_ns = joints.stamp_ns, self._now_ns
         self._front, self._rear = (
             Rotation(shape.alpha, joints.stamp_ns, turn.angle, self._speed(turn), self._tolerance, zero)
             for shape, turn, zero in (

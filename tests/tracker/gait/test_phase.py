@@ -1,4 +1,5 @@
 import math
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -407,6 +408,26 @@ def test_samples_without_a_stamp_take_the_time_of_their_arrival() -> None:
     assert (status.front_steps, status.rear_steps) == (whole.front_steps, whole.rear_steps)
     assert (status.restarts, status.n_uncertain, status.refusals) == (0, False, {})
     assert status.cadence.rate == pytest.approx(200.0)
+
+
+@pytest.mark.parametrize(
+    ('stamp', 'hints'),
+    [
+        (lambda since: since, ()),
+        (lambda since: 2 * since, ()),
+        (lambda since: since // 1000, ('stamps',)),
+        (lambda since: since * 1000, ('stamps',)),
+        (lambda since: (since + 1_234_567) % SECOND, ('stamps',)),
+    ],
+)
+def test_stamps_that_do_not_pass_as_time_does_are_hinted_at(
+    stamp: Callable[[int], int], hints: tuple[str, ...]
+) -> None:
+    estimator = PhaseEstimator(PARAMS)
+    for sample in walk(10.0).samples():
+        stamp_ns = 1 + stamp(sample.stamp_ns - START_NS)
+        estimator.update(sample._replace(stamp_ns=stamp_ns), now_ns=10**18 + sample.stamp_ns)
+    assert estimator.status().hints == hints
 
 
 def test_a_simulated_clock_may_start_at_zero() -> None:
