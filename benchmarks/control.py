@@ -26,6 +26,7 @@ import sys
 from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -221,7 +222,7 @@ def through_nodes(phase: float, stack: Stack) -> Walk:
     stack.commands.clear()
     stack.joints.clear()
     stack.wait(lambda: stack.joints and not stack.joints[-1][1].rear.rate, 'wheels that are held')
-    stack.listen(0.5)  # until the estimator has told of them
+    stack.wait_for_estimator()
     stack.enabled = True
     stack.wait(lambda: stack.state == State.ARMED.value, 'a synchronizer that waits')
     stack.joints.clear()
@@ -235,8 +236,11 @@ def through_nodes(phase: float, stack: Stack) -> Walk:
     begun = rolling[0].stamp_ns / SECOND
     sent = [when for when, _ in stack.commands if when > begun]
     waited = max(late, *np.diff(sent))
-    if waited > REAL_TIME or stack.states != [State.ACTIVE.value]:
-        why = f'a node had to wait for {1e3 * waited:.0f} ms, {", ".join(stack.states)}'
+    went = [
+        state for state, _ in groupby(stack.states) if state != State.ARMED.value
+    ]  # each is told again every second
+    if waited > REAL_TIME or went != [State.ACTIVE.value]:
+        why = f'a node had to wait for {1e3 * waited:.0f} ms, {", ".join(went)}'
         print(f'from {100 * phase:.0f} %: {why}: once more', file=sys.stderr)
         return through_nodes(phase, stack)
     forces = [stack.external_force(sample) for sample in rolling]

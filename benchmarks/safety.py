@@ -42,7 +42,7 @@ from dcdrw.suite.processes import free_domain
 from dcdrw_control.sync.safety import Limits, State
 from dcdrw_control.sync.synchronizer import SynchronizerParams
 from dcdrw_msgs_py.executor import StreamExecutor
-from dcdrw_msgs_py.messages import JointSampleReader, PhaseSampleWriter
+from dcdrw_msgs_py.messages import JointSampleReader, PhaseSampleWriter, stamp_ns
 from dcdrw_msgs_py.node import advertise, listen, message_type, steady_clock
 from dcdrw_msgs_py.rig import RigParams
 from dcdrw_msgs_py.samples import SECOND, JointSample, PhaseSample, Turn
@@ -190,6 +190,14 @@ class Stack:
                 raise TimeoutError(f'{what} did not come within {limit:g} s')
             self._executor.spin_once(timeout_sec=0.01)
 
+    def wait_for_estimator(self) -> None:
+        """Until it tells of the simulator that runs now: DDS may take some seconds to tell it of that."""
+        begun = self.joints[-1][1].stamp_ns
+        told: list[int] = []
+        hearing = self._hear(PHASE_STATE, lambda one, when: told.append(stamp_ns(one.header.stamp)))
+        self.wait(lambda: told and told[-1] > begun, 'an estimator that hears the simulator')
+        self._node.destroy_subscription(hearing)
+
     def listen(self, seconds: float) -> None:
         """Listen for a while."""
         end = time.monotonic() + seconds
@@ -244,14 +252,14 @@ class Stack:
         if self.enabled:
             self.beat(True)
 
-    def _hear(self, topic: Topic, take: Callable[[Any, float], None]) -> None:
+    def _hear(self, topic: Topic, take: Callable[[Any, float], None]) -> Any:
         """Listen to a topic; `take` is told when each message was sent [s]."""
 
         def pass_on(message: Any, info: Any) -> None:
             take(message, info['source_timestamp'] / SECOND)
 
         qos = QoSProfile(depth=10_000, reliability=ReliabilityPolicy.RELIABLE)
-        self._node.create_subscription(message_type(topic), topic.name, pass_on, qos)
+        return self._node.create_subscription(message_type(topic), topic.name, pass_on, qos)
 
 
 @contextlib.contextmanager
