@@ -30,7 +30,11 @@ def tree(tmp_path):
 
 def python(tree, code):
     environment = os.environ | {'NUMBA_CACHE_DIR': str(tree / 'cache'), 'PYTHONDONTWRITEBYTECODE': '1'}
-    return subprocess.check_output([sys.executable, '-c', code], cwd=tree, env=environment, text=True)
+    return subprocess.check_output([sys.executable, '-W', 'error', '-c', code], cwd=tree, env=environment, text=True)
+
+
+def kernels(tree):
+    return {path: path.stat().st_mtime_ns for path in (tree / 'cache').rglob('*.nb?')}
 
 
 def change(tree, path, old, new):
@@ -40,8 +44,13 @@ def change(tree, path, old, new):
 
 
 @pytest.mark.skipif(not AVAILABLE, reason='without numba nothing is compiled, and so nothing kept')
-def test_a_constant_that_kernels_freeze_changes_the_result(tree):
-    assert python(tree, RUN).startswith('[0]')
+def test_kernels_are_found_again_until_a_constant_that_they_freeze_changes(tree):
+    result = python(tree, RUN)
+    assert result.startswith('[0]')
+    kept = kernels(tree)
+    assert kept
+    assert python(tree, RUN) == result
+    assert kernels(tree) == kept
     change(tree, 'dcdrw_sim/motion/ends.py', 'SHORTEST_STEP = 1e-9', 'SHORTEST_STEP = 10.0')
     assert python(tree, RUN).startswith('[-2]')  # too fast to follow
 

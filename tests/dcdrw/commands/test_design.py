@@ -66,7 +66,7 @@ def test_parts_for_an_uncertain_rig_need_no_folder_for_a_card(tmp_path, parts, c
 def test_what_swings_beyond_the_band_is_not_recommended_and_what_is_the_monitor_has_seen(tmp_path, capsys):
     path = tmp_path / 'parts.csv'
     path.write_text('kind,value\nspring,16\ndashpot,10\n')
-    given = ['--k', '41.1', '--b', '14.7', '--seconds', '30']
+    given = ['--k', '41.1', '--b', '14.7', '--seconds', '12']
     assert main(['design', '--available', str(path), *given, '--out', str(tmp_path / 'out')]) == 0
     output = capsys.readouterr().out
     assert 'fastest          k = 16 N/m, b = 10 N·s/m' in output
@@ -93,7 +93,7 @@ uncertainty:
 
 def test_a_rig_that_is_known_with_errors_gets_the_coupler_that_is_surest_on_what_it_may_be(tmp_path, parts, capsys):
     (tmp_path / 'rig.yaml').write_text(KNOWN)
-    arguments = ['--rig', tmp_path / 'rig.yaml', '--available', parts, '--seconds', 30, '--out', tmp_path / 'out']
+    arguments = ['--rig', tmp_path / 'rig.yaml', '--available', parts, '--seconds', 12, '--out', tmp_path / 'out']
     assert main(['design', *map(str, arguments), '--format', 'png']) == 0
     output = capsys.readouterr().out
     couplers = json.loads((tmp_path / 'out' / 'design.json').read_text())['couplers']

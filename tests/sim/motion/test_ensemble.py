@@ -1,5 +1,4 @@
 import math
-import os
 import subprocess
 import sys
 
@@ -257,14 +256,13 @@ print(repr([ensemble.counts.tolist(), ensemble.ends.tolist(), ensemble.strikes['
 """
 
 
-def small_case(*arguments, **environment):
+def small_case(*arguments):
     process = subprocess.run(
         [sys.executable, '-W', 'error', '-c', SMALL_CASE, *arguments],
         cwd=ROOT,
         capture_output=True,
         text=True,
         timeout=PATIENCE,
-        env={**os.environ, **environment},
         check=False,
     )
     assert process.returncode == 0, process.stderr
@@ -277,12 +275,3 @@ def test_plain_python_agrees_with_compiled_code():
     plain_counts, plain_ends, plain_times = small_case('plain')
     assert (counts, ends) == (plain_counts, plain_ends)
     assert np.abs(np.subtract(times, plain_times)).max() < 1e-9
-
-
-def test_compiled_code_compiles_without_a_warning_and_is_found_again(tmp_path):
-    pytest.importorskip('numba')
-    first = small_case(NUMBA_CACHE_DIR=str(tmp_path))
-    kept = {path: path.stat().st_mtime_ns for path in tmp_path.rglob('*.nb?')}
-    assert kept
-    assert small_case(NUMBA_CACHE_DIR=str(tmp_path)) == first
-    assert kept == {path: path.stat().st_mtime_ns for path in tmp_path.rglob('*.nb?')}
