@@ -38,7 +38,7 @@ ifdef ARGS
 	@$(BIN)/python -m pytest $(ARGS)
 else
 	@$(BIN)/python -m pytest --numprocesses 2 --dist worksteal -m 'not processes'
-	@$(BIN)/python -m pytest --numprocesses 3 --dist worksteal -m processes
+	@$(BIN)/python -m pytest --numprocesses 3 --dist load --maxschedchunk 1 -m processes
 endif
 
 fuzz: $(READY)

@@ -27,6 +27,11 @@ os.environ.update(
 )
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What takes longest comes first: nobody waits for it in the end."""
+    items.sort(key=lambda item: 'test_commands_of_a_page_run' not in item.name)
+
+
 @pytest.fixture
 def bench(tmp_path: Path) -> Iterator['Bench']:
     from tests.bench import Bench  # here, so that the cores are tested without ROS
