@@ -3,7 +3,7 @@
 import math
 from bisect import bisect_right
 from itertools import accumulate, pairwise
-from statistics import median_low
+from statistics import linear_regression, median_low
 from typing import NamedTuple
 
 LEARNING_COUNTS = (2, 5, 15, 60, 240, 960)
@@ -255,7 +255,9 @@ def _rough(intervals: list[int], ordered: list[int]) -> _Beat | None:
     whole = sum(abs(interval / usual - round(interval / usual)) <= NEAR for interval in long)
     if not long or whole < 0.75 * len(long):
         return beat
-    strays = list(accumulate(interval - mean for interval in common))
+    times = list(accumulate(common))
+    slope, offset = linear_regression(range(len(times)), times)
+    strays = [time - slope * place - offset for place, time in enumerate(times)]
     made_up = len(long) >= MANY_LONG and max(strays) - min(strays) <= GAP * max(longest - shortest, period)
     return beat if made_up else None
 

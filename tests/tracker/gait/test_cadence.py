@@ -75,6 +75,12 @@ def test_intervals_that_make_up_for_one_another_are_no_gaps(pattern: tuple[int, 
     assert (status.gaps, status.longest) == (1, pytest.approx(0.3, abs=0.03))
 
 
+def test_stamps_by_a_clock_that_ticks_coarsely_are_no_gaps() -> None:
+    status = tick([15.625 * (20 * sample // 15.625) for sample in range(1300)]).status()
+    assert (status.gaps, status.lost) == (0, 0)
+    assert status.rate == pytest.approx(50.0, rel=0.01)
+
+
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**32), st.booleans())
 def test_intervals_as_it_happens_are_no_gaps(seed: int, on_time: bool) -> None:
