@@ -13,6 +13,7 @@ import numpy as np
 
 from dcdrw_msgs_py.rolling import speed_kept
 from dcdrw_msgs_py.values import Floats
+from dcdrw_tracker.gait.resolution import Resolution
 
 PLACES = 36
 """Places within a step at which strikes are looked for."""
@@ -35,6 +36,9 @@ SHARP, EVIDENCE = 1.05, 12.0
 """What is braked at once leaves so many times less, and by so much, if it is taken so."""
 SURER = 6.0
 """Where many numbers of spokes are tried, one may be so by chance."""
+EVEN, LEARNED = 2.0, 5000
+"""What straight lines leave of the motion must be so many times the variance that an encoder's count makes of an even
+one: counts come in patterns that look like strikes. So many samples tell the count."""
 MOST_STEPS, MOST_IN_STEP = 48, 40
 """Steps, and samples in each, from which everything is told: more would tell little more."""
 SAME, MORE = 0.03, 1.25
@@ -108,6 +112,8 @@ def doubt(time: Floats, psi: Floats, alpha: float) -> Doubt | None:
 
     """
     pitch = 2.0 * alpha
+    if _is_even(time, psi, pitch):
+        return None
     time, psi = _enough(time, psi, pitch)
     if len(psi) < FEWEST * FEWEST or psi[-1] - psi[0] < FEWEST * pitch:
         return None
@@ -143,6 +149,14 @@ def doubt(time: Floats, psi: Floats, alpha: float) -> Doubt | None:
 def _plain_loss(pitch: float) -> float:
     """The part of its speed that a plain wheel loses by a strike."""
     return 1.0 - speed_kept(0.5 * pitch)
+
+
+def _is_even(time: Floats, psi: Floats, pitch: float) -> bool:
+    """Whether a wheel turns as evenly as its encoder can tell, so that nothing shows where it is braked."""
+    resolution = Resolution()
+    for moved, dt in zip(np.diff(psi[:LEARNED]).tolist(), np.diff(time[:LEARNED]).tolist(), strict=True):
+        resolution.take(moved, dt)
+    return bool(resolution.count) and _roughness(time, psi, pitch, 0.0, 1) < EVEN * resolution.count**2 / 12.0
 
 
 def _enough(time: Floats, psi: Floats, pitch: float) -> tuple[Floats, Floats]:
@@ -236,7 +250,7 @@ def _loss(time: Floats, psi: Floats, pitch: float, at: float) -> tuple[float, fl
     return float(losses.mean()), error, sharp, (sharp - 1.0) * spare
 
 
-def _roughness(time: Floats, psi: Floats, pitch: float, at: float) -> float:
+def _roughness(time: Floats, psi: Floats, pitch: float, at: float, degree: int = DEGREE) -> float:
     """The variance that polynomials in time leave of the motion, one from each of these places to the next [rad²]."""
     step = np.floor((psi - at) / pitch)
     begins = np.flatnonzero(np.diff(step)) + 1  # the first step is not whole, nor is the last
@@ -250,13 +264,13 @@ def _roughness(time: Floats, psi: Floats, pitch: float, at: float) -> float:
     half = np.where(last > first, 0.5 * (last - first), 1.0)
     x = (t - 0.5 * (first + last)[number]) / half[number]
     y = y - (np.add.reduceat(y, starts) / counts)[number]
-    moments = np.add.reduceat(x[:, None] ** np.arange(2 * DEGREE + 1), starts)
-    along = np.add.reduceat(x[:, None] ** np.arange(DEGREE + 1) * y[:, None], starts)
+    moments = np.add.reduceat(x[:, None] ** np.arange(2 * degree + 1), starts)
+    along = np.add.reduceat(x[:, None] ** np.arange(degree + 1) * y[:, None], starts)
     pause = np.maximum.reduceat(np.diff(t, append=t[-1]), starts)
-    whole = (counts > DEGREE + 1) & (np.diff(step[begins]) == 1) & (pause <= NEAR * half)
+    whole = (counts > degree + 1) & (np.diff(step[begins]) == 1) & (pause <= NEAR * half)
     if not whole.any():
         return math.nan
-    normal = moments[whole][:, np.add.outer(np.arange(DEGREE + 1), np.arange(DEGREE + 1))]
-    solved = np.linalg.solve(normal + 1e-9 * np.eye(DEGREE + 1), along[whole][..., None])[..., 0]
+    normal = moments[whole][:, np.add.outer(np.arange(degree + 1), np.arange(degree + 1))]
+    solved = np.linalg.solve(normal + 1e-9 * np.eye(degree + 1), along[whole][..., None])[..., 0]
     left = np.add.reduceat(y * y, starts)[whole] - np.einsum('si,si->s', solved, along[whole])
-    return max(float(left.sum()), 1e-12) / float((counts[whole] - DEGREE - 1).sum())
+    return max(float(left.sum()), 1e-12) / float((counts[whole] - degree - 1).sum())

@@ -47,6 +47,24 @@ def test_nothing_is_said_of_a_wheel_that_is_driven(seed):
     assert doubt(time, np.maximum.accumulate(psi), ALPHA) is None
 
 
+@pytest.mark.parametrize(
+    ('counts', 'rate', 'step'), [(500, 200.0, 0.6), (1000, 50.0, 0.55), (2000, 200.0, 0.55), (4096, 100.0, 0.7)]
+)
+def test_the_counts_of_an_encoder_that_turns_evenly_are_no_strikes(counts, rate, step):
+    time = np.arange(0.0, 20.0, 1.0 / rate)
+    count = math.tau / counts
+    for part in (0.0, 0.3, 0.6):
+        assert doubt(time, count * np.floor(PITCH * time / step / count + part), ALPHA) is None
+
+
+@pytest.mark.parametrize('counts', [2000, 4096])
+def test_a_wrong_zero_is_told_by_counts_too(counts):
+    time, psi = rolled(200.0, 10.0, 0.0)
+    count = math.tau / counts
+    told = doubt(time, count * np.floor((psi + 0.2) / count), ALPHA)
+    assert abs(math.remainder(told.zero - 0.2, PITCH)) < math.radians(2.5)
+
+
 def test_too_few_strikes_tell_nothing():
     time, psi = rolled(200.0, 2.5, 0.0)
     assert doubt(time, psi + 0.2, ALPHA) is None
