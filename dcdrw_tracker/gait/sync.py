@@ -242,27 +242,31 @@ class SyncMonitor:
         with the speeds.
         """
         even = self._cadence.seconds(dt)
-        if even == dt:
-            found = self._struck(last, now, dt)
-            return found and (*found[:2], dt)
-        told = [(*found, time) for time in (dt, even) if (found := self._struck(last, now, time))]
-        front, rear, _, time = min(told, key=lambda one: one[2], default=(0, 0, math.nan, math.nan))
-        return (front, rear, time) if told else None
+        found = self._struck(last, now, dt)
+        other = self._struck(last, now, even) if even != dt else None
+        if other and (not found or self._off(last, now, other, even) < self._off(last, now, found, dt)):
+            return *other, even
+        return (*found, dt) if found else None
 
-    def _struck(self, last: PhaseSample, now: PhaseSample, dt: float) -> tuple[int, int, float] | None:
-        """Strikes of both wheels within dt seconds, and how far from where their speeds have them they are [rad]."""
-        told = _told_steps(last, now)
-        front = _strikes(last.front, now.front, dt, self._front_alpha, told[0])
-        rear = _strikes(last.rear, now.rear, dt, self._rear_alpha, told[1])
+    def _struck(self, last: PhaseSample, now: PhaseSample, dt: float) -> tuple[int, int] | None:
+        """Strikes of both wheels within dt seconds; None where no pair moves so."""
+        told_front, told_rear = _told_steps(last, now)
+        front = _strikes(last.front, now.front, dt, self._front_alpha, told_front)
+        rear = _strikes(last.rear, now.rear, dt, self._rear_alpha, told_rear)
         if front is None or rear is None:
             return None
         if now.step_difference - last.step_difference != front - rear and not _may_miss_strikes(last, now, dt):
             return None
+        return front, rear
+
+    def _off(self, last: PhaseSample, now: PhaseSample, strikes: tuple[int, int], dt: float) -> float:
+        """How far the wheels are, with so many strikes, from where their speeds have them after dt seconds [rad]."""
+        front, rear = strikes
         turned = abs(now.front.angle - last.front.angle + 2.0 * self._front_alpha * front) + abs(
             now.rear.angle - last.rear.angle + 2.0 * self._rear_alpha * rear
         )
         speed = 0.5 * sum(abs(rate) for rate in (last.front.rate, now.front.rate, last.rear.rate, now.rear.rate))
-        return front, rear, abs(speed * dt - turned)
+        return abs(speed * dt - turned)
 
     @property
     def held(self) -> bool:
@@ -545,8 +549,9 @@ def _unevenness(one: tuple[float, float], two: tuple[float, float], three: tuple
     early, late, whole = dt1 + dt2, dt2 + dt3, dt1 + dt2 + dt3
     slope = move2 / dt2
     difference = (move3 / dt3 - slope) / late - (slope - move1 / dt1) / early
-    weights = whole / (dt1 * dt2 * late), whole / (early * dt2 * dt3), 1.0 / (dt1 * early), 1.0 / (late * dt3)
-    return difference * difference / sum(weight * weight for weight in weights)
+    weight1, weight2 = whole / (dt1 * dt2 * late), whole / (early * dt2 * dt3)
+    weight0, weight3 = 1.0 / (dt1 * early), 1.0 / (late * dt3)
+    return difference**2 / (weight0 * weight0 + weight1 * weight1 + weight2 * weight2 + weight3 * weight3)
 
 
 def _told_steps(last: PhaseSample, now: PhaseSample) -> tuple[int | None, int | None]:
