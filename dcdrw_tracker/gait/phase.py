@@ -297,7 +297,7 @@ class PhaseEstimator:
                     self._arrived_ns = arrival_ns
                     return update
             return self._hold(joints, 'outlier', arrival_ns)
-        if elapsed_ns == 0 and joints[1:3] == last[1:3]:
+        if elapsed_ns == 0 and (joints.front.angle, joints.rear.angle) == (last.front.angle, last.rear.angle):
             self._duplicates += 1
             self._refusal = 'repeated'
             return None

@@ -11,12 +11,13 @@ MANY_UNEVEN = 10
 class Resolution:
     """The largest angle of which all changes of a rotation are multiples.
 
-    An even motion whose changes are all alike tells nothing of an encoder: they must differ, by whole counts.
+    An even motion whose changes are all alike tells nothing of an encoder, however its samples are stamped: they must
+    differ, by whole counts.
     """
 
     def __init__(self) -> None:
         self._count = math.inf
-        self._rate = math.nan
+        self._moved = self._rate = math.nan
         self._uneven = 0
 
     def take(self, moved: float, dt: float) -> None:
@@ -25,9 +26,9 @@ class Resolution:
             return
         if moved:
             self._count = common_divisor(self._count, abs(moved), FINEST)
-        if abs(moved - self._rate * dt) > 0.5 * self._count:
+        if min(abs(moved - self._rate * dt), abs(moved - self._moved)) > 0.5 * self._count:
             self._uneven += 1
-        self._rate = moved / dt
+        self._moved, self._rate = moved, moved / dt
 
     @property
     def is_fine(self) -> bool:

@@ -439,6 +439,18 @@ def test_a_simulated_clock_may_start_at_zero() -> None:
     assert (estimator.status().duplicates, estimator.status().refusals) == (4, {})
 
 
+@pytest.mark.parametrize('rate', [0.0, math.nan])
+def test_a_message_that_comes_twice_counts_once_with_speeds_or_without(rate: float) -> None:
+    estimator = PhaseEstimator(PARAMS)
+    for sample in walk(2.0).samples():
+        for _ in range(2):
+            front, rear = (turn._replace(rate=turn.rate + rate) for turn in (sample.front, sample.rear))
+            estimator.update(sample._replace(front=front, rear=rear))
+    status = estimator.status()
+    assert status.duplicates == status.accepted
+    assert not status.refusals
+
+
 SIGNS = st.sampled_from([1, -1])
 
 

@@ -45,6 +45,10 @@ def test_an_even_motion_is_no_encoder():
     for lost in [1, 1, 2, 1, 3, 1] * 20:  # of which samples are missing
         resolution.take(0.15 * lost, 0.1 * lost)
     assert resolution.count == 0.0
+    resolution = Resolution()
+    for dt in [0.001, 0.001, 0.298] * 20:  # stamped in bursts, as its samples arrive
+        resolution.take(0.15, dt)
+    assert resolution.count == 0.0
 
 
 def test_a_wheel_that_rests_has_none():
