@@ -22,6 +22,8 @@ MANY_LONG = 12
 """So many intervals that seem to be gaps tell of a source that is uneven, where they make up for one another."""
 COMMON = 0.95
 """The share of the intervals of an uneven source that tells its longest and its shortest."""
+HASTE = 0.5
+"""Samples that come within so many periods of one another after a pause had waited: they make up for it."""
 NEAR = 0.25
 """So near whole periods, by the share of one, intervals lie between which samples were lost."""
 
@@ -84,6 +86,8 @@ class Cadence:
         self.burst = 1
         """Samples that arrive together: 1 where they come one by one."""
         self._intervals: list[int] = []
+        self._pause: list[int] = []
+        """A pause, and the intervals of the samples that came at once after it, while some may still wait."""
         self._counts: tuple[int, ...] = LEARNING_COUNTS
         self._others = 0
         """How many intervals in a row, all alike, have been far longer or shorter than the period."""
@@ -98,9 +102,38 @@ class Cadence:
         if interval <= 0:
             return
         self._last_ns = stamp_ns
-        intervals = self._intervals
-        intervals.append(interval)
         beat = self._beat
+        if self._pause:
+            if beat and interval < HASTE * beat.period_ns:
+                self._pause.append(interval)
+                if sum(self._pause) <= len(self._pause) * beat.period_ns:
+                    self._go_on()
+                return
+            self._go_on()
+            beat = self._beat
+        if beat and beat.size == 1.0 and interval > beat.gap_ns:
+            self._pause.append(interval)
+        else:
+            self._take(interval)
+
+    def _go_on(self) -> None:
+        """Take a pause and what had waited for its end: those samples had been taken evenly."""
+        if not self._pause:
+            return
+        pause, *waited = self._evened()
+        self._pause.clear()
+        for interval in (pause, *waited):
+            self._take(interval)
+
+    def _evened(self) -> list[int]:
+        """A pause as it was for the source, and the intervals of the samples that had waited."""
+        waited = len(self._pause) - 1
+        even = self.period_ns
+        return [max(sum(self._pause) - waited * even, even), *[even] * waited]
+
+    def _take(self, interval: int) -> None:
+        intervals, beat = self._intervals, self._beat
+        intervals.append(interval)
         if beat and beat.size == 1.0:
             if beat.period_ns <= GAP * interval and interval <= beat.gap_ns:
                 self._others = 0
@@ -118,6 +151,7 @@ class Cadence:
 
     def jump(self, stamp_ns: int) -> None:
         """Go on from another stamp, without a gap: the source has started anew."""
+        self._go_on()
         self._settle()
         self._intervals.clear()
         self._last_ns, self._before_ns, self._others = stamp_ns, 0, 0
@@ -140,6 +174,10 @@ class Cadence:
     def status(self) -> CadenceStatus:
         """A snapshot."""
         gaps, lost, longest_ns, *_ = self._judged()
+        if beat := self._beat if self._pause else None:
+            pause = self._evened()[0]
+            if pause > beat.gap_ns:
+                gaps, lost, longest_ns = gaps + 1, lost + round(pause / beat.period_ns) - 1, max(longest_ns, pause)
         rate = 1e9 * self._beat.size / self._beat.period_ns if self._beat else math.nan
         return CadenceStatus(rate, self._gaps + gaps, self._lost + lost, max(self._longest_ns, longest_ns) * 1e-9)
 

@@ -43,6 +43,25 @@ def test_every_sample_lost_at_random_is_counted(seed: int, share: float) -> None
     assert status.lost == kept.count(False)
 
 
+@pytest.mark.parametrize('lost', [0, 3])
+@pytest.mark.parametrize('pause', [100.0, 300.0, 2000.0])
+@pytest.mark.parametrize('every', [1.0, 5.0, 16.0])
+def test_samples_that_wait_for_the_end_of_a_pause_are_not_lost(every: float, pause: float, lost: int) -> None:
+    """A driver that is kept waiting stamps what had come meanwhile one right after the other; some may be dropped."""
+    stamps: list[float] = []
+    for sample in range(round(20e3 / every)):
+        at = every * sample
+        for begin in (5000.0, 9000.0):
+            if begin < at < begin + pause:
+                at = begin + pause
+        stamps.append(max(at, stamps[-1] + 0.02 if stamps else 0.0))
+    first = next(place for place, stamp in enumerate(stamps) if stamp >= 5000.0 + pause)
+    del stamps[first : first + lost]
+    status = tick(stamps).status()
+    assert (status.gaps, status.lost) == (lost > 0, lost)
+    assert status.rate == pytest.approx(1e3 / every, rel=0.01)
+
+
 def test_jitter_is_no_gap() -> None:
     assert tick([10 * sample + (sample % 3) for sample in range(300)]).status().gaps == 0
 

@@ -98,7 +98,8 @@ def test_pictures_become_joint_states_detections_and_a_debug_image(bench):
     for header in runs:
         read.runs.announce(stamp_ns(header.stamp), header.frame_id)
     samples = [read.read(message) for message in joints]
-    assert len({sample.run for sample in samples}) == 1
+    for before, after in pairwise(samples):  # unless a busy machine lost the pictures of more than a quarter turn
+        assert before.run == after.run or SPEED * (after.stamp_ns - before.stamp_ns) * 1e-9 > math.pi / 2
     assert samples[0].run > 0
     for sample in samples:
         for turn in (sample.front, sample.rear):
