@@ -131,7 +131,12 @@ def test_settling_is_staying_within_the_band_at_the_last_sections(theta2):
 # In step
 
 
-@given(st.lists(between(-5.0, 5.0), min_size=HOLD_STEPS + 1, max_size=20), between(0.0, 5.0))
+def off_the_edge(theta2):
+    """Not on the band's edge, 1.8°, where rounding decides."""
+    return abs(abs(theta2) - 1.8) > 1e-9
+
+
+@given(st.lists(between(-5.0, 5.0).filter(off_the_edge), min_size=HOLD_STEPS + 1, max_size=20), between(0.0, 5.0))
 def test_steps_are_counted_to_the_strike_that_opens_the_first_step_wholly_inside_for_good(theta2, swing):
     judgement, _ = judged(theta2, swing=swing)
     outside = np.abs(np.radians(theta2)) > 0.06 * 2 * ALPHA
