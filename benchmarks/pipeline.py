@@ -19,11 +19,11 @@ at most their p99 from joint state to command; nothing lost.
 """
 
 import argparse
-import itertools
 import os
 import subprocess
 import sys
 import time
+from collections import defaultdict, deque
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -209,8 +209,9 @@ def match(
         joints, expected = joints[1:], expected[1:]
     if not expected:
         raise SystemExit('the errors do not belong to the joint states')
-    arrived = itertools.dropwhile(lambda error: error[0] != expected[0], errors)
-    pending = next(arrived, None)
+    arrived = defaultdict[float, deque[int]](deque)
+    for value, at in errors:
+        arrived[value].append(at)
     period = np.median(np.diff([stamp_ns(message.header.stamp) for message in joints]))
     last = None
     for message, value in zip(joints, expected, strict=True):
@@ -220,10 +221,9 @@ def match(
             missing = round((stamp - last) / period) - 1  # never reached this process
             lost, sent = lost + missing, sent + missing
         last = stamp
-        if pending and pending[0] == value:
-            if measured:
-                latencies.append((pending[1] - stamp) / 1e3)
-            pending = next(arrived, None)
+        at = arrived[value].popleft() if arrived[value] else None
+        if measured and at:
+            latencies.append((at - stamp) / 1e3)
         elif measured:
             lost += 1
         sent += measured
