@@ -236,9 +236,8 @@ def through_nodes(phase: float, stack: Stack) -> Walk:
     begun = rolling[0].stamp_ns / SECOND
     sent = [when for when, _ in stack.commands if when > begun]
     waited = max(late, *np.diff(sent))
-    went = [
-        state for state, _ in groupby(stack.states) if state != State.ARMED.value
-    ]  # each is told again every second
+    # Each state is told again every second.
+    went = [state for state, _ in groupby(stack.states) if state != State.ARMED.value]
     if waited > REAL_TIME or went != [State.ACTIVE.value]:
         why = f'a node had to wait for {1e3 * waited:.0f} ms, {", ".join(went)}'
         print(f'from {100 * phase:.0f} %: {why}: once more', file=sys.stderr)

@@ -203,15 +203,14 @@ def match(
 ) -> tuple[Any, int, int]:
     """Pair each joint state of the measured time with the error that it led to: latencies [µs], sent, lost."""
     latencies, sent, lost = [], 0, 0
-    # The ends of the chain were not found at the same instant: begin with the first pair that was heard of both.
-    heard = {value for value, _ in errors}
-    while expected and expected[0] not in heard:
-        joints, expected = joints[1:], expected[1:]
-    if not expected:
-        raise SystemExit('the errors do not belong to the joint states')
     arrived = defaultdict[float, deque[int]](deque)
     for value, at in errors:
         arrived[value].append(at)
+    # The ends of the chain were not found at the same instant: begin with the first pair that was heard of both.
+    while expected and expected[0] not in arrived:
+        joints, expected = joints[1:], expected[1:]
+    if not expected:
+        raise SystemExit('the errors do not belong to the joint states')
     period = np.median(np.diff([stamp_ns(message.header.stamp) for message in joints]))
     last = None
     for message, value in zip(joints, expected, strict=True):

@@ -38,6 +38,9 @@ class _Verdict(NamedTuple):
     """How many times as fast as the recording they pass; NaN where that is not known."""
 
 
+_UNKNOWN = _Verdict(False, math.nan)
+
+
 def dated(batches: Iterable[JointBatch], joints: PhaseParams) -> Iterator[JointBatch]:
     """The same batches, with the time of recording in the place of stamps that tell none.
 
@@ -96,9 +99,6 @@ def _dated(
         )
 
 
-_UNKNOWN = _Verdict(False, math.nan)
-
-
 def _judged(stamp_ns: Times, log_ns: Times, turns: Floats, fastest: float) -> _Verdict | None:
     """What stamps are worth while wheels turn [rad]; None where these turn too little to tell."""
     log_ns = np.maximum.accumulate(log_ns)
@@ -113,11 +113,12 @@ def _judged(stamp_ns: Times, log_ns: Times, turns: Floats, fastest: float) -> _V
     paces = passed / recorded
     pace = float(np.median(paces))
     near = (paces > 0.2 * pace) & (paces < 5.0 * pace)  # no clock was set there, nor did the recorder pause
+    passes = _Verdict(False, float(passed[near].sum() / recorded[near].sum()))
     if np.median(turned / recorded) > fastest:  # a simulation that goes as fast as it can
-        return _Verdict(False, float(passed[near].sum() / recorded[near].sum()))
+        return passes
     goes_on = (np.diff(turns, axis=0) != 0.0).any(axis=1)
     stands = np.count_nonzero(goes_on & (np.diff(stamp_ns) == 0)) > STANDING * np.count_nonzero(goes_on)
     reach = int(np.ptp(stamp_ns))
     wraps = reach < min(LARGEST_PART_NS, 0.5 * pace * int(log_ns[-1] - log_ns[0]))
-    is_none = bool(stands or wraps or pace >= FASTER or np.median(turned / passed) > fastest)
-    return _Verdict(is_none, math.nan if is_none else float(passed[near].sum() / recorded[near].sum()))
+    is_none = stands or wraps or pace >= FASTER or np.median(turned / passed) > fastest
+    return _Verdict(True, math.nan) if is_none else passes

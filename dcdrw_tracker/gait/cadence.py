@@ -86,8 +86,8 @@ class Cadence:
         self.burst = 1
         """Samples that arrive together: 1 where they come one by one."""
         self._intervals: list[int] = []
-        self._pause: list[int] = []
-        """A pause, and the intervals of the samples that came at once after it, while some may still wait."""
+        self._pause_ns = self._waited = 0
+        """From the sample before a pause to the last one, and how many came at once after it, while some may wait."""
         self._counts: tuple[int, ...] = LEARNING_COUNTS
         self._others = 0
         """How many intervals in a row, all alike, have been far longer or shorter than the period."""
@@ -103,33 +103,33 @@ class Cadence:
             return
         self._last_ns = stamp_ns
         beat = self._beat
-        if self._pause:
+        if self._pause_ns:
             if beat and interval < HASTE * beat.period_ns:
-                self._pause.append(interval)
-                if sum(self._pause) <= len(self._pause) * beat.period_ns:
+                self._pause_ns += interval
+                self._waited += 1
+                if self._pause_ns <= (1 + self._waited) * beat.period_ns:
                     self._go_on()
                 return
             self._go_on()
             beat = self._beat
         if beat and beat.size == 1.0 and interval > beat.gap_ns:
-            self._pause.append(interval)
+            self._pause_ns = interval
         else:
             self._take(interval)
 
     def _go_on(self) -> None:
         """Take a pause and what had waited for its end: those samples had been taken evenly."""
-        if not self._pause:
+        if not self._pause_ns:
             return
-        pause, *waited = self._evened()
-        self._pause.clear()
-        for interval in (pause, *waited):
-            self._take(interval)
+        pause, waited, even = self._sampled_pause(), self._waited, self.period_ns
+        self._pause_ns = self._waited = 0
+        self._take(pause)
+        for _ in range(waited):
+            self._take(even)
 
-    def _evened(self) -> list[int]:
-        """A pause as it was for the source, and the intervals of the samples that had waited."""
-        waited = len(self._pause) - 1
-        even = self.period_ns
-        return [max(sum(self._pause) - waited * even, even), *[even] * waited]
+    def _sampled_pause(self) -> int:
+        """The pause as it was for the source [ns], which sampled evenly what had waited."""
+        return max(self._pause_ns - self._waited * self.period_ns, self.period_ns)
 
     def _take(self, interval: int) -> None:
         intervals, beat = self._intervals, self._beat
@@ -173,11 +173,8 @@ class Cadence:
 
     def status(self) -> CadenceStatus:
         """A snapshot."""
-        gaps, lost, longest_ns, *_ = self._judged()
-        if beat := self._beat if self._pause else None:
-            pause = self._evened()[0]
-            if pause > beat.gap_ns:
-                gaps, lost, longest_ns = gaps + 1, lost + round(pause / beat.period_ns) - 1, max(longest_ns, pause)
+        pause = [self._sampled_pause()] if self._pause_ns else []
+        gaps, lost, longest_ns, *_ = self._judged(self._intervals + pause)
         rate = 1e9 * self._beat.size / self._beat.period_ns if self._beat else math.nan
         return CadenceStatus(rate, self._gaps + gaps, self._lost + lost, max(self._longest_ns, longest_ns) * 1e-9)
 
@@ -198,15 +195,15 @@ class Cadence:
         """
         kept = self._intervals[len(self._intervals) - others :]
         del self._intervals[len(self._intervals) - others :]
-        gaps, lost, longest_ns, rest, self._before_ns = self._judged()
+        gaps, lost, longest_ns, rest, self._before_ns = self._judged(self._intervals)
         self._gaps += gaps
         self._lost += lost
         self._longest_ns = max(self._longest_ns, longest_ns)
         self._intervals = rest + kept
 
-    def _judged(self) -> tuple[int, int, int, list[int], int]:
+    def _judged(self, intervals: list[int]) -> tuple[int, int, int, list[int], int]:
         """Gaps, lost samples, the longest gap [ns], the intervals of the last burst, and the time before it [ns]."""
-        beat, intervals = self._beat, self._intervals
+        beat = self._beat
         if beat is None:
             return 0, 0, 0, intervals, 0
         gaps = lost = longest_ns = 0

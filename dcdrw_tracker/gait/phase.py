@@ -350,9 +350,9 @@ class PhaseEstimator:
         return is_other_unit or len(self._clock_steps) >= OFTEN
 
     def _hints(self) -> tuple[Hint, ...]:
-        hints: list[Hint] = []
         if self._are_stamps_off():
             return ('stamps',)  # by which all else is judged
+        hints: list[Hint] = []
         swift = self.params.unit == 'rad' and any(
             abs(wheel.pace) > _fastest_rolling(shape)
             for wheel, shape in ((self._front, self.params.front), (self._rear, self.params.rear))
