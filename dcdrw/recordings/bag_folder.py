@@ -1,7 +1,7 @@
 """Which files a recording consists of, and what its metadata tell of them."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -53,7 +53,6 @@ def find_bag(path: Path) -> Bag:
         return Bag(path, [path], [], {}, 0, [])
     for folder in (path, path / RECORDING):
         files = sorted((file for file in folder.glob('*') if file.is_file() and is_storage(file)), key=_number)
-        files = [file for file in files if not (file.suffix in COMPRESSIONS and file.with_suffix('') in files)]
         if files:
             return _described(folder, files)
     if (path / METADATA).exists():
@@ -73,17 +72,18 @@ def _no_recording(path: Path, why: str) -> ValueError:
 
 def is_storage(path: Path) -> bool:
     """Whether a name is that of a recording's file."""
-    return (path.with_suffix('') if path.suffix in COMPRESSIONS else path).suffix in STORAGES
+    return _plain(path).suffix in STORAGES
 
 
 def _described(folder: Path, files: list[Path]) -> Bag:
     """The files of a folder, as its metadata tell, where they can be read and tell of what is there."""
     told, notes = _metadata(folder / METADATA)
-    names = told.get('relative_file_paths')
-    named = [file for name in (names if isinstance(names, list) else []) if (file := _named(str(name), files))]
+    paths = told.get('relative_file_paths')
+    names = list(map(str, paths)) if isinstance(paths, list) else []
+    files = _without_doubles(files, {Path(name).name for name in names})
+    named = [file for name in names if (file := _named(name, files))]
     named = list(dict.fromkeys(named))  # one that is named twice has its messages once
-    missing = [str(name) for name in names if not _named(str(name), files)] if isinstance(names, list) else []
-    missing = list(dict.fromkeys(missing))
+    missing = list(dict.fromkeys(name for name in names if not _named(name, files)))
     lost: list[str] = []
     if missing:
         others = [file for file in files if file not in named]
@@ -124,6 +124,17 @@ def _metadata(path: Path) -> tuple[dict[str, Any], list[str]]:
     )
 
 
+def _without_doubles(files: list[Path], names: Collection[str]) -> list[Path]:
+    """Each file once, though it be there compressed and not: the one that the metadata name, else the compressed one.
+
+    The other is what rosbag2's player decompressed, or a part of it; or what its recorder, killed, was compressing.
+    """
+    chosen: dict[Path, Path] = {}
+    for file in sorted(files, key=lambda file: (file.name in names, file.suffix in COMPRESSIONS, file.name)):
+        chosen[_plain(file)] = file
+    return [file for file in files if file in chosen.values()]
+
+
 def _named(name: str, files: list[Path]) -> Path | None:
     """The file of this name, compressed or not; rosbag2 once wrote the folder before it."""
     wanted = Path(name).name
@@ -131,8 +142,13 @@ def _named(name: str, files: list[Path]) -> Path | None:
     return next((file for name in same for file in files if file.name == name), None)
 
 
+def _plain(file: Path) -> Path:
+    """A file's name without that of its compression."""
+    return file.with_suffix('') if file.suffix in COMPRESSIONS else file
+
+
 def _stem(file: Path) -> str:
-    return (file.with_suffix('') if file.suffix in COMPRESSIONS else file).stem
+    return _plain(file).stem
 
 
 def _number(file: Path) -> tuple[str, int]:

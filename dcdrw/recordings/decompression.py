@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 from dcdrw_msgs_py.words import counted
 
@@ -46,11 +46,20 @@ def decompress(data: bytes, compression: str, size: int = LARGEST) -> bytes:
     return b''.join(parts)
 
 
-def unpack_file(source: Path, target: Path) -> str:
-    """Decompress a zstd file, and keep what comes before damage.
+class Unpacked(NamedTuple):
+    """How a compressed file was decompressed."""
 
-    Returns:
-        What is wrong with the file; empty where nothing is.
+    trouble: str = ''
+    """What is wrong with it; empty where nothing is."""
+    unended: bool = False
+    """Whether no more is wrong than that its last frame has no end.
+
+    rosbag2 ends none whose content is a multiple of 128 KiB: whether anything is missing, the content alone can tell.
+    """
+
+
+def unpack_file(source: Path, target: Path) -> Unpacked:
+    """Decompress a zstd file, and keep what comes before damage.
 
     Raises:
         OSError: the file cannot be read or there is no room for its content.
@@ -67,9 +76,10 @@ def unpack_file(source: Path, target: Path) -> str:
             except OSError:
                 raise
             except Exception as error:  # of any kind, for the content may be anything
-                return f'its compressed data end in damage after {counted(written, "byte")} ({error})'
+                text = f'its compressed data end in damage after {counted(written, "byte")} ({error})'
+                return Unpacked(text, isinstance(error, EOFError))
             if part is None:
-                return ''
+                return Unpacked()
             written += len(part)
             if written > most:
                 raise ValueError(f'{source} grows beyond {_HIGHEST_RATIO} times its size when it is decompressed')
@@ -91,7 +101,7 @@ def _unpacked(packed: BinaryIO) -> Iterator[bytes]:
             yield frame.decompress(piece)
             piece, frame = (frame.unused_data, None) if frame.eof else (b'', frame)
     if frame:
-        raise ValueError('the file is cut off')
+        raise EOFError('the file is cut off')
 
 
 def _stream(data: bytes, compression: str) -> Any:

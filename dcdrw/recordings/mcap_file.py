@@ -81,6 +81,14 @@ class _Piece(NamedTuple):
     checksum: int = 0
 
 
+def has_end(path: Path) -> bool:
+    """Whether an MCAP file ends as its writer ends one."""
+    with path.open('rb') as file:
+        size = file.seek(0, os.SEEK_END)
+        file.seek(max(0, size - len(MAGIC)))
+        return size >= 2 * len(MAGIC) and file.read() == MAGIC
+
+
 class McapFile(BagFile):
     """An open MCAP file.
 
@@ -96,7 +104,7 @@ class McapFile(BagFile):
         try:
             self._size = os.fstat(self._file.fileno()).st_size
             self._window, self._window_at = b'', 0
-            self.closed = self._size >= 2 * len(MAGIC) and self._is_end(self._size - len(MAGIC))
+            self.closed = has_end(path)
             self._schemas: dict[int, Schema] = {}
             self._channels: dict[int, Channel] = {}
             self._statistics: Statistics | None = None

@@ -192,19 +192,25 @@ class Recording(AbstractContextManager['Recording']):
 
     def _open(self, path: Path) -> None:
         """Open a file; one that is none costs only itself where there are others."""
+        from dcdrw.recordings import mcap_file, sqlite_file
         from dcdrw.recordings.decompression import unpack_file
-        from dcdrw.recordings.mcap_file import McapFile
-        from dcdrw.recordings.sqlite_file import SqliteFile
 
-        name, inner = str(path), path
+        name, inner, plain = str(path), path, path.with_suffix('')
         try:
             if path.suffix in COMPRESSIONS:
-                inner = self._scratch() / path.with_suffix('').name
-                trouble = unpack_file(path, inner)
-                if trouble:
+                has_end = (mcap_file if plain.suffix == '.mcap' else sqlite_file).has_end
+                inner = self._scratch() / plain.name
+                trouble, unended = unpack_file(path, inner)
+                whole = has_end(inner) and (unended or not trouble)
+                if not whole and self.path.is_dir() and plain.is_file() and has_end(plain):
+                    self._notes.append(f'{name} is not whole; {plain.name} is read in its place')
+                    name, inner = str(plain), plain
+                elif trouble and not whole:
                     self._lost.append(f'{name}: {trouble}')
             file: BagFile = (
-                McapFile(inner, name) if inner.suffix == '.mcap' else SqliteFile(inner, name, self._scratch())
+                mcap_file.McapFile(inner, name)
+                if inner.suffix == '.mcap'
+                else sqlite_file.SqliteFile(inner, name, self._scratch())
             )
         except (ValueError, OSError) as error:
             self._lost.append(in_words(error))

@@ -32,6 +32,13 @@ _LIMIT_LENGTH = 0
 """SQLITE_LIMIT_LENGTH, which Python names from 3.11 on."""
 
 
+def has_end(path: Path) -> bool:
+    """Whether an sqlite3 file has as many pages as its first one tells."""
+    with path.open('rb') as file:
+        page, pages = _pages(file.read(100))
+    return 0 < page * pages <= path.stat().st_size
+
+
 class SqliteFile(BagFile):
     """An open sqlite3 file.
 

@@ -6,6 +6,7 @@ import shutil
 import sqlite3
 from collections.abc import Callable
 from contextlib import closing
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -317,6 +318,105 @@ def test_a_compressed_file_that_is_cut_off_is_told_of_and_read_as_far_as_it_goes
     with Recording(whole) as recording:
         assert recording.damage == []
         assert len(list(recording.messages([JOINTS]))) == 200 * len(MESSAGES)
+
+
+PIECE = 2**17
+"""What rosbag2 compresses at once [bytes]."""
+
+
+def compressed(content: bytes) -> bytes:
+    """As rosbag2 compresses a file: a piece that is not full ends the frame, and where there is none, nothing does."""
+    packer = zstandard.ZstdCompressor().compressobj()
+    parts = [packer.compress(content[at : at + PIECE]) for at in range(0, len(content), PIECE)]
+    return b''.join(parts) + (packer.flush() if len(content) % PIECE else b'')
+
+
+def full_pieces(path: Path, storage: StoragePlugin) -> bytes:
+    """A recording of 6000 messages whose size is a multiple of what rosbag2 compresses at once."""
+    if storage == StoragePlugin.SQLITE3:
+        (file,) = write_bag(path, MESSAGES * 20, storage=storage).glob('*.db3')
+        with closing(sqlite3.connect(file, isolation_level=None)) as connection:
+            connection.execute('CREATE TABLE filler (data BLOB)')
+            while file.stat().st_size % PIECE:
+                connection.execute('INSERT INTO filler VALUES (zeroblob(4000))')
+        return file.read_bytes()
+    content = one_chunk(MESSAGES * 20)
+    return one_chunk(MESSAGES * 20, filling=-len(content) % PIECE)
+
+
+def one_chunk(messages: list[tuple[int, bytes]], filling: int = 0) -> bytes:
+    """An MCAP file with one chunk, which is not compressed."""
+    file = BytesIO()
+    writer = Writer(file, chunk_size=2**24, compression=CompressionType.NONE)
+    writer.start('ros2', 'one chunk')
+    writer.add_metadata('filling', {'': 'x' * filling})
+    schema = writer.register_schema(JOINT_STATE, 'ros2msg', b'')
+    channel = writer.register_channel(JOINTS.name, 'cdr', schema)
+    for log_ns, data in messages:
+        writer.add_message(channel, log_ns, data, log_ns)
+    writer.finish()
+    return file.getvalue()
+
+
+@pytest.mark.parametrize('storage', list(StoragePlugin))
+def test_a_compressed_file_without_an_end_is_whole_where_its_content_is(storage, tmp_path):
+    content = full_pieces(tmp_path / 'bag', storage)
+    packed = compressed(content)
+    assert len(content) % PIECE == 0
+    assert zstandard.get_frame_parameters(packed).content_size == zstandard.CONTENTSIZE_UNKNOWN
+    file = tmp_path / f'bag_0.{"db3" if storage == StoragePlugin.SQLITE3 else "mcap"}.zstd'
+    file.write_bytes(packed)
+    with Recording(file) as recording:
+        assert len(list(recording.messages([JOINTS]))) == 6000
+        assert (recording.damage, recording.notes) == ([], [])
+    for short in (compressed(content[:-PIECE]), packed[:-9]):
+        file.write_bytes(short)
+        with Recording(file) as recording:
+            assert 'the file is cut off' in recording.damage[0]
+
+
+@pytest.mark.parametrize('storage', list(StoragePlugin))
+@pytest.mark.parametrize('described', [True, False])
+@pytest.mark.parametrize(
+    ('plain', 'packed'),
+    [
+        (1.0, 1.0),  # the player was here
+        (0.6, 1.0),  # and was killed
+        (1.0, 0.6),  # the recorder was killed while it compressed
+        (1.0, 0.0),
+    ],
+)
+def test_of_a_file_that_is_there_compressed_and_not_the_whole_one_is_read(storage, described, plain, packed, tmp_path):
+    bag = write_bag(tmp_path / 'bag', MESSAGES * 20, storage=storage, compression=CompressionMode.FILE)
+    (file,) = bag.glob('*.zstd')
+    content = file.read_bytes()
+    whole = zstandard.ZstdDecompressor().decompressobj().decompress(content)
+    file.write_bytes(content[: int(packed * len(content))])
+    file.with_suffix('').write_bytes(whole[: int(plain * len(whole))])
+    if not described:
+        (bag / 'metadata.yaml').unlink()
+    with Recording(bag) as recording:
+        assert len(list(recording.messages([JOINTS]))) == 6000
+        assert recording.damage == []
+        told = [note for note in recording.notes if 'metadata.yaml' not in note]
+        assert told == ([] if packed == 1 else [f'{file} is not whole; {file.stem} is read in its place'])
+
+
+def test_of_a_file_that_is_there_compressed_and_not_the_one_that_the_metadata_name_is_read(tmp_path):
+    bag = write_bag(tmp_path / 'bag', MESSAGES)
+    (bag / 'bag.mcap.zstd').write_bytes(b'of something else')
+    assert read(bag) == (list(range(300)), [])
+    with Recording(bag) as recording:
+        assert recording.notes == []
+
+
+def test_parts_that_are_there_twice_are_read_once_where_the_metadata_name_others(tmp_path):
+    bag = write_bag(tmp_path / 'bag', MESSAGES, compression=CompressionMode.FILE)
+    packed = bag / 'bag.mcap.zstd'
+    (bag / 'walk.mcap').write_bytes(zstandard.ZstdDecompressor().decompressobj().decompress(packed.read_bytes()))
+    packed.rename(bag / 'walk.mcap.zstd')
+    shutil.copy(bag / 'walk.mcap.zstd', bag / 'walk.mcap.zst')
+    assert read(bag) == (list(range(300)), [])
 
 
 def test_a_file_that_the_metadata_name_twice_is_read_once(tmp_path):
