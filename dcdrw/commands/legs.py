@@ -46,8 +46,8 @@ def run(options: argparse.Namespace) -> int:
     check_json(options)
     if folder and not options.force:
         free_folder(folder)
-    walk, damage = read_walk(options.file, options.rate, options.rig, options.namespace)
-    for text in damage:
+    walk, damage, notes = read_walk(options.file, options.rate, options.rig, options.namespace)
+    for text in (*damage, *notes):
         print(f'dcdrw legs: {text}', file=sys.stderr)
     summary = summarize_walk(walk)
     tell(options, sentences(summary), summary)

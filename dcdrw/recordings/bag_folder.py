@@ -113,7 +113,7 @@ def _described(folder: Path, files: list[Path]) -> Bag:
 def _metadata(path: Path) -> tuple[dict[str, Any], list[str]]:
     """What metadata.yaml says, and what is wrong with it."""
     if not path.exists():
-        return {}, []
+        return {}, [f'{path.parent} has no {METADATA}, so whether files are missing is not known']
     try:
         content = read_yaml(path)
     except (ValueError, OSError) as error:

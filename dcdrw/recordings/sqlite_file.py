@@ -6,6 +6,7 @@ than its first page tells: a copy is made as long again, with pages of zeros in 
 """
 
 import os
+import re
 import shutil
 import sqlite3
 from collections.abc import Collection, Iterator
@@ -28,6 +29,8 @@ _MOST_GAPS = 1000
 _LAST_ID = 2**63 - 1
 _DAMAGED = (sqlite3.Error, UnicodeError, OverflowError, MemoryError)
 """What sqlite3 raises on damage: a length that no machine has is MemoryError."""
+_NO_MESSAGE = re.compile(r'^message_count: 0$', re.MULTILINE)
+"""In metadata: none was written yet, in all files together."""
 _LIMIT_LENGTH = 0
 """SQLITE_LIMIT_LENGTH, which Python names from 3.11 on."""
 
@@ -70,13 +73,13 @@ class SqliteFile(BagFile):
             os.truncate(path, size - size % page)
             os.truncate(path, told)
             self._damage['end'] = f'{name} is cut off: {size} of {told} bytes are there'
-        self.closed = not journals
         self._size = path.stat().st_size + sum(journal.stat().st_size for journal in _journals(path))
         uri = f'{path.resolve().as_uri()}?{"mode=rw" if journals else "mode=ro&immutable=1"}'
         self._steps = 0
         self._connection = sqlite3.connect(uri, uri=True, isolation_level=None, check_same_thread=False)
         try:
             self._open()
+            self.closed = not (journals or self._is_begun())
         except (*_DAMAGED, TypeError) as error:
             self.close()
             raise ValueError(f'{name} cannot be read: {" ".join(str(error).split())[:200]}') from None
@@ -138,6 +141,16 @@ class SqliteFile(BagFile):
         except (*_DAMAGED, TypeError):
             self._orderly = False
             self._count([(key, 1, log_ns, log_ns) for key, log_ns, _ in self._salvage()])
+
+    def _is_begun(self) -> bool:
+        """Whether its recorder told the metadata as it opened the file, still without messages, and not again.
+
+        rosbag2 tells them here as it opens a file and as it closes it; up to Humble never; rosbags as it closes it.
+        """
+        told: list[Any] = []
+        with suppress(*_DAMAGED):
+            told = self._query('SELECT metadata FROM metadata LIMIT 2')
+        return len(told) == 1 and bool(_NO_MESSAGE.search(str(told[0][0]))) and any(self.counts.values())
 
     def _count(self, rows: Collection[tuple[int, int, int, int]]) -> None:
         """Take counts and times by topic."""

@@ -22,8 +22,8 @@ PAUSE = 2.0
 
 def read_walk(
     path: Path, rate: float = math.nan, rig: Path | None = None, namespace: str = ''
-) -> tuple[Walk, list[str]]:
-    """Follow the legs in a CSV file, or in a recording of their sensors; tells what of it is damaged, and left out.
+) -> tuple[Walk, list[str], list[str]]:
+    """Follow the legs in a CSV file, or in a recording of their sensors; tells its damage, and notes, too.
 
     Args:
         path: the file, or the recording.
@@ -38,13 +38,14 @@ def read_walk(
     """
     if path.suffix.lower() == '.csv':
         params = read_parameter_file(rig, WalkParams(), namespace) if rig else WalkParams()
-        return follow(read_legs(path, rate).readings, params.legs), []
+        return follow(read_legs(path, rate).readings, params.legs), [], []
     with Recording(path) as recording:
         legs, topics = recorded_walk(recording, rig, namespace)
         if not topics:
             where = f' in {namespace}' if namespace else ''
             raise ValueError(f'{path} has no topic of a sensor on a leg{where}, as front/left_imu')
-        return follow(leg_readings(recording, legs.hip_joints, namespace), legs), recording.damage
+        walk = follow(leg_readings(recording, legs.hip_joints, namespace), legs)
+        return walk, recording.damage, recording.notes
 
 
 def summarize_walk(walk: Walk) -> dict[str, dict[str, Any]]:

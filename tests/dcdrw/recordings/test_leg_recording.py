@@ -72,6 +72,16 @@ def test_the_command_tells_of_each_leg_of_a_recording(tmp_path, capsys):
     assert 'exists already' in capsys.readouterr().err
 
 
+def test_the_command_says_what_is_to_be_known_of_the_recording(tmp_path, capsys):
+    walk = write_walk(tmp_path / 'walk', LEGS[:2])
+    (walk / 'metadata.yaml').unlink()
+    assert main(['legs', str(walk)]) == 0
+    assert (
+        capsys.readouterr().err
+        == f'dcdrw legs: {walk} has no metadata.yaml, so whether files are missing is not known\n'
+    )
+
+
 def test_a_recorded_person_before_a_robot_is_followed_by_estimator_and_monitor_through_the_turn():
     """The robot walks as the person does, a quarter of a stride ahead of it."""
     ahead_ns = 270_000_000

@@ -502,8 +502,78 @@ def test_killed_sqlite_recording_is_read_with_what_stands_in_its_journal(tmp_pat
     assert read(folder) == (list(range(300)), [])
     assert read(folder / 'killed_0.db3') == (list(range(300)), [])
     with Recording(folder) as recording:
-        assert 'was not closed' in recording.notes[0]
+        assert any('was not closed' in note for note in recording.notes)
         assert mend(recording, tmp_path / 'mended') == 300
+
+
+BEGUN = """\
+version: 9
+storage_identifier: sqlite3
+duration:
+  nanoseconds: 0
+starting_time:
+  nanoseconds_since_epoch: 9223372036854775807
+message_count: 0
+topics_with_message_count:
+  []
+compression_format: ""
+compression_mode: ""
+relative_file_paths:
+  - bag_0.db3
+files:
+  - path: bag_0.db3
+    starting_time:
+      nanoseconds_since_epoch: 9223372036854775807
+    duration:
+      nanoseconds: 0
+    message_count: 0
+custom_data: ~
+ros_distro: jazzy"""
+"""The metadata that rosbag2 writes into an sqlite3 file as it opens it."""
+SPLIT = BEGUN.replace('    message_count: 0', '    message_count: 8791')
+"""Those that it writes as it goes on in the next file: into this one, and into that one."""
+ENDED = BEGUN.replace('message_count: 0', 'message_count: 300')
+
+
+@pytest.mark.parametrize(
+    ('told', 'closed'),
+    [
+        ([BEGUN], False),
+        ([SPLIT], False),
+        ([BEGUN, ENDED], True),
+        ([BEGUN, SPLIT], True),
+        ([SPLIT, ENDED], True),
+        ([ENDED], True),  # as rosbags does, which writes them at the end alone
+        ([], True),  # as ROS Humble does, which writes none
+        (None, True),  # as earlier ones do, which have no such table
+    ],
+)
+def test_sqlite_recording_that_its_recorder_did_not_close_is_told_of(told, closed, tmp_path):
+    bag = write_bag(tmp_path / 'bag', MESSAGES, storage=StoragePlugin.SQLITE3)
+    with closing(sqlite3.connect(bag / 'bag.db3')) as connection, connection:
+        connection.execute('DELETE FROM metadata')
+        if told is None:
+            connection.execute('DROP TABLE metadata')
+        else:
+            connection.executemany(
+                'INSERT INTO metadata (metadata_version, metadata) VALUES (9, ?)', [(text,) for text in told]
+            )
+    assert read(bag) == (list(range(300)), [])
+    said = [
+        f'{bag}/bag.db3 was not closed: its recorder was killed, or is at work; what it has so far is read',
+        f'`dcdrw mend {bag} --out NEW` writes what can be read into a new recording',
+    ]
+    with Recording(bag) as recording:
+        assert recording.notes == ([] if closed else said)
+
+
+@pytest.mark.parametrize('storage', list(StoragePlugin))
+def test_a_folder_without_metadata_is_told_of_and_judged_by_all_that_is_there(storage, tmp_path):
+    bag = write_bag(tmp_path / 'bag', MESSAGES, storage=storage)
+    (bag / 'metadata.yaml').unlink()
+    assert read(bag) == (list(range(300)), [])
+    with Recording(bag) as recording:
+        assert recording.notes == [f'{bag} has no metadata.yaml, so whether files are missing is not known']
 
 
 def test_sqlite_recording_in_progress_is_read_and_locks_nobody_out(tmp_path):
