@@ -53,6 +53,7 @@ _PARSED: dict[int, Any] = {
     Opcode.METADATA_INDEX: MetadataIndex,
     Opcode.SUMMARY_OFFSET: SummaryOffset,
 }
+_WITH_MESSAGES = (Opcode.MESSAGE, Opcode.CHUNK)
 _LONGEST_TEXT = 16 * 2**20
 """Longest record of those that are parsed [bytes]."""
 _MAYBE = re.compile(rb'(?=[\x01-\x0f].{5}\0\0\0)', re.DOTALL)
@@ -167,10 +168,22 @@ class McapFile(BagFile):
             at = self._resume(0)
         unsure: int | None = None
         """A record just before, whose shape does not vouch for its length."""
+        cut: _Piece | None = None
+        """A chunk that the file's end cuts off."""
         while at < self._size:
             end = self._end_of(at)
             if end is None:
                 if self._is_end(at):
+                    break
+                chunk = self._cut_chunk(at)
+                if chunk and not chunk.compression:  # its records stand there as they would outside of chunks
+                    cut, at, unsure = chunk, chunk.begin, None
+                    continue
+                if chunk:
+                    self._pieces.append(chunk._replace(size=self._size - chunk.begin, plain_size=-1, checksum=0))
+                if chunk or self._is_cut_off(at):
+                    if self._bytes(at, 1)[0] in _WITH_MESSAGES:  # of an index that is cut off nothing is missed
+                        self._note_end(at)
                     break
                 if unsure is not None:
                     self._forget(unsure)
@@ -181,6 +194,9 @@ class McapFile(BagFile):
             self._take(kind, at, end)
             unsure = at if kind == Opcode.MESSAGE else None
             at = end
+        if cut:
+            there = self._size - cut.begin
+            self._note('end', f'the chunk at byte {cut.record} is cut off: {there} of {cut.size} bytes are there')
 
     def _is_end(self, at: int) -> bool:
         """Whether the file ends here, and as it should."""
@@ -189,16 +205,18 @@ class McapFile(BagFile):
     def _resume(self, at: int) -> int:
         """Note damage, and return where the next whole record begins."""
         found = self._find(at + 1)
-        kind = 'damaged'
         if found == self._size and not self.closed:
-            kind = 'the beginning of what is missing'
-            cut = self._cut_chunk(at)
-            if cut:
-                self._pieces.append(cut)
-        self._note(
-            ('gap', at), f'{counted(found - at, "byte")} from byte {at} on {by_count(found - at, "is", "are")} {kind}'
-        )
+            self._note_end(at)
+        else:
+            self._note(('gap', at), f'{self._stretch(at, found)} damaged')
         return found
+
+    def _note_end(self, at: int) -> None:
+        self._note('end', f'{self._stretch(at, self._size)} the beginning of what is missing')
+
+    @staticmethod
+    def _stretch(begin: int, end: int) -> str:
+        return f'{counted(end - begin, "byte")} from byte {begin} on {by_count(end - begin, "is", "are")}'
 
     def _find(self, at: int) -> int:
         """The next place where two whole records follow each other; the file's size where there is none."""
@@ -264,13 +282,24 @@ class McapFile(BagFile):
         return _Piece(at, begin, size, start_ns, name.decode(), plain_size, checksum)
 
     def _cut_chunk(self, at: int) -> _Piece | None:
-        """What there is of a chunk that the file's end cuts off."""
-        if self._bytes(at, 1) != bytes([Opcode.CHUNK]):
+        """The chunk that begins here and that the file's end cuts off; None where there is none."""
+        head = self._bytes(at, _HEAD.size)
+        if head[:1] != bytes([Opcode.CHUNK]):
             return None
         chunk = self._chunk(at)
-        if chunk is None or chunk.begin >= self._size:
-            return None
-        return chunk._replace(size=self._size - chunk.begin, plain_size=-1, checksum=0)
+        end = at + _HEAD.size + int.from_bytes(head[1:], 'little')
+        return chunk if chunk and chunk.begin + chunk.size == end > self._size and not self.closed else None
+
+    def _is_cut_off(self, at: int) -> bool:
+        """Whether a record begins here that the file's end cuts off, and nothing whole comes after."""
+        head = self._bytes(at, _HEAD.size + 2)
+        kind, length, channel = head[0], *(int.from_bytes(part, 'little') for part in (head[1:9], head[9:]))
+        longest = LARGEST if kind in _WITH_MESSAGES else _LONGEST_TEXT
+        if self.closed or not Opcode.HEADER <= kind <= Opcode.DATA_END or length > longest:
+            return False
+        if kind == Opcode.MESSAGE and len(head) == _HEAD.size + 2 and channel not in self._channels:
+            return False
+        return at + _HEAD.size + length > self._size and self._find(at + 1) == self._size
 
     @staticmethod
     def _parse(kind: int, content: bytes) -> Any:
