@@ -94,8 +94,14 @@ class StreamExecutor(Executor):
         by_handle = self._by_handle  # what a callback brings or takes is looked up before the next wait
         for pointer in timers:
             timer = by_handle[pointer]
-            if timer.handle.is_timer_ready():
-                timer.handle.call_timer()
+            try:
+                with timer.handle:
+                    is_due = timer.handle.is_timer_ready()
+                    if is_due:
+                        timer.handle.call_timer()
+            except InvalidHandle:  # another one's callback has destroyed it
+                continue
+            if is_due:
                 timer.callback()
         for pointer in subscriptions:
             self._read(by_handle[pointer])
@@ -190,7 +196,8 @@ class StreamExecutor(Executor):
         end = time.monotonic() + TURN_SECONDS
         while True:
             try:
-                taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+                with subscription.handle:
+                    taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
             except InvalidHandle:  # a callback has destroyed it
                 return
             if taken is None:

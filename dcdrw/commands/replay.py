@@ -16,7 +16,8 @@ from dcdrw_msgs_py.words import counted
 
 _EPILOG = """\
 The samples keep the stamps that they had, and /clock goes with them: start the nodes with use_sim_time, so that they
-see the trial as it was. FACTOR is that of the stamps' time. The replay begins when somebody listens to joint_states.
+see the trial as it was. FACTOR is that of the stamps' time. The replay begins when somebody listens to joint_states;
+until then /clock stands at the first stamp.
 S counts from the recording's start, by its recorder's clock.
 Exit status: 0 all was sent, 2 wrong input, 130 interrupted.
 """

@@ -3,6 +3,7 @@
 import sys
 import time
 from array import array
+from collections import OrderedDict
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -34,6 +35,8 @@ from dcdrw_msgs_py.yaml_file import yaml_text
 LOOK_SECONDS = 0.5
 """How often the recorder looks who publishes, and who has not told its parameters yet."""
 ASK_AGAIN_SECONDS = 2.0
+REMEMBERED = 2 * SAMPLE_DEPTH
+"""So many messages of a topic are known again when they come by a second subscription, too."""
 
 
 class RecorderNode(Node):
@@ -45,7 +48,7 @@ class RecorderNode(Node):
         self.recorder: Recorder | None = None
         self.failure = ''
         """Why the last recording ended before it was told to."""
-        self._ears: dict[str, _Ear] = {}
+        self._heard: dict[str, _Heard] = {}
         self._told: dict[str, dict[str, Any]] = {}
         """The parameters that the nodes told."""
         self._asked: dict[str, float] = {}
@@ -86,9 +89,9 @@ class RecorderNode(Node):
 
     def end(self) -> None:
         """End the recording, if there is one, and write its index."""
-        for ear in self._ears.values():
-            self.destroy_subscription(ear.subscription)
-        self._ears.clear()
+        for heard in self._heard.values():
+            self._close(heard.ears)
+        self._heard.clear()
         recorder, self.recorder = self.recorder, None
         if recorder is None:
             return
@@ -125,14 +128,20 @@ class RecorderNode(Node):
             self.recorder.about['note'] = params.note
 
     def _look(self) -> None:
-        """Listen to each topic, reliably where all of its publishers are reliable; ask for parameters."""
+        """Listen to each topic as its publishers offer it; ask for parameters."""
         if self.recorder is None:
             return
         types = dict(self.get_topic_names_and_types())
         for name, topic in self._wanted.items():
             kind = topic.type or next(iter(types.get(name, ())), '')
-            if kind:
-                self._listen(name, topic._replace(type=kind))
+            if kind and name not in self._heard:
+                self._heard[name] = _Heard(name, topic._replace(type=kind))
+        for heard in list(self._heard.values()):
+            offers = self._offers(heard)
+            if heard.ears and (heard.ears[-1].hears or not offers):
+                self._close(heard.ears[:-1])
+                del heard.ears[:-1]
+            self._listen(heard, offers)
         for node, (client, names) in self._questions.items():
             late = time.monotonic() - self._asked.get(node, 0.0) > ASK_AGAIN_SECONDS
             if node not in self._told and late and client.service_is_ready():
@@ -141,43 +150,61 @@ class RecorderNode(Node):
                     partial(self._on_parameters, node, names)
                 )
 
-    def _listen(self, name: str, topic: Topic) -> None:
-        offers = [offer.qos_profile for offer in self.get_publishers_info_by_topic(name)]
-        reliable = all(offer.reliability == ReliabilityPolicy.RELIABLE for offer in offers)
-        latched = (
-            topic.latched
-            if not offers
-            else all(offer.durability == DurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
-        )
-        ear = self._ears.get(name)
-        if ear and (ear.reliable, ear.latched) == (reliable, latched):
-            return
-        stream = Stream(name, topic.type)
-        if self.recorder and stream not in self.recorder.counts:
+    def _offers(self, heard: '_Heard') -> set['_Offer']:
+        """What the publishers of a topic offer now."""
+        return {
+            _Offer(
+                end.qos_profile.reliability == ReliabilityPolicy.RELIABLE,
+                end.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL,
+            )
+            for end in self.get_publishers_info_by_topic(heard.stream.name)
+        }
+
+    def _listen(self, heard: '_Heard', offers: set['_Offer']) -> None:
+        """Listen so that all publishers match: reliably where all are, and to what was said before where all keep it.
+
+        While there is none, best effort hears whoever comes; only what is declared latched is awaited as that. A new
+        subscription takes over once it hears: until then both listen, and nothing is lost between them.
+        """
+        latched = heard.topic.latched
+        if not (heard.ears and offers <= heard.offered):
+            heard.offered |= offers
+            qos = [offered_qos(*offer, heard.topic.depth) for offer in sorted(heard.offered) or [_Offer(True, latched)]]
             try:
-                self.recorder.add_topic(name, topic.type, [offered_qos(reliable, latched, topic.depth)])
+                if self.recorder:
+                    self.recorder.add_topic(heard.stream.name, heard.stream.type, qos)
             except ValueError as error:
                 self.get_logger().warning(str(error))
-                del self._wanted[name]
+                del self._wanted[heard.stream.name], self._heard[heard.stream.name]
                 return
-        if ear:
-            self.destroy_subscription(ear.subscription)
-        qos = QoSProfile(
-            depth=max(topic.depth, SAMPLE_DEPTH),
-            reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-            durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
-        )
-        self._ears[name] = _Ear(
-            reliable,
-            latched,
-            self.create_subscription(
-                message_type(topic), name, lambda data: self._on_message(stream, data), qos, raw=True
+        asked = _Offer(*map(all, zip(*offers, strict=True))) if offers else _Offer(latched, latched)
+        if heard.ears and heard.ears[-1].asked == asked:
+            return
+        ear = _Ear(asked)
+        ear.subscription = self.create_subscription(
+            message_type(heard.topic),
+            heard.stream.name,
+            lambda data, info: self._on_message(heard, ear, data, info),
+            QoSProfile(
+                depth=max(heard.topic.depth, SAMPLE_DEPTH),
+                reliability=ReliabilityPolicy.RELIABLE if asked.reliable else ReliabilityPolicy.BEST_EFFORT,
+                durability=DurabilityPolicy.TRANSIENT_LOCAL if asked.latched else DurabilityPolicy.VOLATILE,
             ),
+            raw=True,
         )
+        heard.ears.append(ear)
 
-    def _on_message(self, stream: Stream, data: bytes) -> None:
-        if self.recorder:
-            self.recorder.write(stream, data)
+    def _close(self, ears: list['_Ear']) -> None:
+        for ear in ears:
+            self.destroy_subscription(ear.subscription)
+
+    def _on_message(self, heard: '_Heard', ear: '_Ear', data: bytes, info: Any) -> None:
+        ear.hears = True
+        if self.recorder is None or not heard.is_new(info):
+            return
+        if not self.recorder.counts[heard.stream]:  # the file names with the first message what is offered
+            self._listen(heard, self._offers(heard))
+        self.recorder.write(heard.stream, data)
 
     def _on_parameters(self, node: str, names: list[str], answer: Any) -> None:
         """Keep a node's parameters, as a file that the suite reads and beside the recording's other metadata."""
@@ -236,12 +263,42 @@ class RecorderNode(Node):
         )
 
 
-class _Ear(NamedTuple):
-    """A subscription, and how it was made."""
+class _Offer(NamedTuple):
+    """How a topic is published, or listened to."""
 
     reliable: bool
     latched: bool
-    subscription: Any
+
+
+class _Ear:
+    """A subscription: what it asks for, and whether a message has come by it."""
+
+    def __init__(self, asked: _Offer) -> None:
+        self.asked = asked
+        self.hears = False
+        self.subscription: Any = None
+
+
+class _Heard:
+    """A topic that is listened to."""
+
+    def __init__(self, name: str, topic: Topic) -> None:
+        self.topic, self.stream = topic, Stream(name, topic.type)
+        self.offered: set[_Offer] = set()
+        """All that its publishers have offered so far."""
+        self.ears: list[_Ear] = []
+        """The last one stays."""
+        self._known: OrderedDict[tuple[int, int], None] = OrderedDict()
+
+    def is_new(self, info: dict[str, int]) -> bool:
+        """Whether the message, of which rclpy's MessageInfo tells, has not come by another subscription before."""
+        key = info['source_timestamp'], info['publication_sequence_number']
+        if key in self._known:
+            return False
+        self._known[key] = None
+        if len(self._known) > REMEMBERED:
+            self._known.popitem(last=False)
+        return True
 
 
 def _reason(error: OSError, recorder: Recorder) -> str:

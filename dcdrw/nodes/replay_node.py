@@ -44,7 +44,8 @@ class ReplayNode(Node):
     """Publishes each joint state when it is due by its stamp; what is late is sent at once, never dropped.
 
     So the rate is that of the trial's own time, also where this was simulated faster. Where the stamps stand still, go
-    back or jump, the recorder's log tells the time.
+    back or jump, the recorder's log tells the time. Until it begins, /clock stands at the first stamp: some nodes, the
+    recorder of `ros2 bag record --use-sim-time` among them, listen to nothing before they know the time.
     """
 
     def __init__(
@@ -75,6 +76,7 @@ class ReplayNode(Node):
         self._due_ns = 0
         self._begun = 0.0
         self._told_ns = -CLOCK_NS
+        self._begin()
         self._timer = self.create_timer(LOOK_SECONDS, self._wait, clock=steady_clock())
 
     def _begin(self) -> None:
@@ -88,6 +90,8 @@ class ReplayNode(Node):
 
     def _wait(self) -> None:
         """Begin when somebody listens, and nobody new has come for a while."""
+        if self._next:
+            self._tell(self._next_ns)
         now = time.monotonic()
         found = (
             self._joints.get_subscription_count(),
@@ -99,7 +103,7 @@ class ReplayNode(Node):
             self._found, self._since = found, now
         if self._joints.get_subscription_count() and now - self._since >= SETTLE_SECONDS:
             self.destroy_timer(self._timer)
-            self._begin()
+            self._begun = now
             self._timer = self.create_timer(TICK_SECONDS, self._play, clock=steady_clock())
 
     def _play(self) -> None:
@@ -125,11 +129,14 @@ class ReplayNode(Node):
             step_ns = self._next_ns - last_ns
             self._due_ns += step_ns if 0 < step_ns <= STEP_NS else self._next.log_ns - last.log_ns
 
+    def _tell(self, now_ns: int) -> None:
+        self._told_ns = now_ns
+        self._clock_publisher.publish(Clock(clock=to_stamp(now_ns or 1)))  # zero says in ROS that no time is known
+
     def _publish(self, message: Message, stamp_ns: int) -> None:
         self.log_ns = message.log_ns
         if not 0 <= stamp_ns - self._told_ns < CLOCK_NS:  # the clock first: no sample lies far in the future
-            self._told_ns = stamp_ns
-            self._clock_publisher.publish(Clock(clock=to_stamp(stamp_ns)))
+            self._tell(stamp_ns)
         while self._announced and _stamp_ns(self._announced[0]) <= stamp_ns:  # the run before its first sample
             self._runs.publish(self._announced.pop(0).data)
         if self._names:

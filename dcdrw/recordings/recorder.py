@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from datetime import datetime
+from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -126,8 +127,6 @@ class Recorder:
         # Wall time at the start, and from there on a clock that never jumps: the log stays in order.
         self._zero_ns = time.time_ns() - time.monotonic_ns()
         self._start_ns = self._end_ns = 0
-        self._told: tuple[Any, ...] = ()
-        """What the metadata on the disk rest on."""
         self._disk = ThreadPoolExecutor(1, 'disk')
         self._syncing: Future[None] | None = None
         self._writer.start('ros2', f'dcdrw {self.about["dcdrw_version"]}')
@@ -140,7 +139,7 @@ class Recorder:
         return self._file.size
 
     def add_topic(self, name: str, kind: str, qos: Sequence[dict[str, Any]]) -> Stream:
-        """Add a topic, with what its publishers offer; returns what `write` knows it by.
+        """Add a topic, or tell anew what its publishers offer; returns what `write` knows it by.
 
         Raises:
             ValueError: the type is not one of ROS 2 Jazzy's own, so its definition is not known.
@@ -158,7 +157,7 @@ class Recorder:
     def add(self, topic: RecordedTopic) -> Stream:
         """Add a topic that is described already; returns what `write` knows it by."""
         self._topics[topic.stream] = topic
-        self.counts[topic.stream] = 0
+        self.counts.setdefault(topic.stream, 0)
         return topic.stream
 
     def write(self, topic: Stream, data: bytes, log_ns: int | None = None) -> None:
@@ -187,10 +186,7 @@ class Recorder:
             self._syncing.result()
             self._syncing = None
         if self._syncing is None:
-            told = (tuple(self._channels), tuple(self.about.items()))
-            metadata = '' if told == self._told else yaml_text(self._metadata())
-            self._told = told
-            self._syncing = self._disk.submit(self._sync, metadata)
+            self._syncing = self._disk.submit(self._sync, self._metadata())
 
     def close(self) -> None:
         """End the recording with its index.
@@ -205,7 +201,7 @@ class Recorder:
             self._file.flush()
             if self._syncing:
                 self._syncing.result()
-            self._sync(yaml_text(self._metadata()))
+            self._sync(self._metadata())
         finally:
             self.abort()
 
@@ -270,13 +266,13 @@ class Recorder:
         """The metadata within the file, as rosbag2 does it."""
         self._writer.add_metadata('rosbag2', {'serialized_metadata': yaml_text(self._metadata()[INFORMATION])})
 
-    def _sync(self, metadata: str) -> None:
-        """Bring to the disk what was flushed, and new metadata where there are any."""
+    def _sync(self, metadata: dict[str, Any]) -> None:
+        """Bring to the disk what was flushed, and then the metadata, which count no message that is not there."""
         self._file.sync()
-        if metadata:
-            write_whole(self.folder / METADATA, metadata)
+        write_whole(self.folder / METADATA, yaml_text(metadata))
 
 
+@lru_cache
 def _profiles(qos: str) -> list[Any]:
     """QoS profiles from their text, which may come from a damaged recording."""
     try:

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterator
 from itertools import pairwise
+from typing import Any
 
 import pytest
 import rclpy
@@ -99,6 +100,39 @@ def test_services_are_served_and_entities_come_and_go_while_it_spins(pair):
     pair.until(lambda: heard == [1.0], 'the message')
     pair.hearer.destroy_subscription(subscription)
     pair.until(lambda: not publisher.get_subscription_count(), 'its end')
+
+
+def test_what_another_callback_has_destroyed_is_passed_over(pair):
+    """Both are ready at once, and whichever comes first destroys the other."""
+    publisher = pair.speaker.create_publisher(Float64, 'phi', 10)
+    called: list[str] = []
+    subscriptions: dict[str, Any] = {}
+    timers: dict[str, Any] = {}
+
+    def hear(name: str, other: str) -> None:
+        called.append(name)
+        pair.hearer.destroy_subscription(subscriptions[other])
+
+    def tick(name: str, other: str) -> None:
+        called.append(name)
+        for each in (name, other):
+            pair.hearer.destroy_timer(timers[each])
+
+    for one, other in (('a', 'b'), ('b', 'a')):
+        subscriptions[one] = listen(pair.hearer, PHI, lambda _, one=one, other=other: hear(one, other))
+    pair.until(lambda: publisher.get_subscription_count() == 2, 'the subscriptions')
+    publisher.publish(Float64(data=1.0))
+    pair.until(lambda: called, 'the message')
+    assert len(called) == 1
+    called.clear()
+    for one, other in (('a', 'b'), ('b', 'a')):
+        timers[one] = pair.hearer.create_timer(
+            0.001, lambda one=one, other=other: tick(one, other), clock=steady_clock()
+        )
+    while not all(timer.is_ready() for timer in timers.values()):
+        pass
+    pair.until(lambda: called, 'the tick')
+    assert len(called) == 1
 
 
 def test_an_exception_of_a_callback_comes_out_of_the_executor(pair):

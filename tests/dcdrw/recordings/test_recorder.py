@@ -6,6 +6,7 @@ import resource
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,7 @@ from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
-from dcdrw.recordings.recorder import Recorder
+from dcdrw.recordings.recorder import Recorder, offered_qos
 from dcdrw.recordings.recording import Recording
 from dcdrw.suite.executables import RECORDED
 from dcdrw.suite.parameter_file import TrialParams, read_parameter_file
@@ -26,6 +27,7 @@ from dcdrw_msgs_py.messages import to_stamp
 from dcdrw_msgs_py.topics import DIAGNOSTICS, JOINT_STATES, ROSOUT, SYNCHRONIZED, Topic
 from tests import ROOT
 from tests.bags import JOINTS, TYPES
+from tests.patience import PATIENCE
 
 pytestmark = pytest.mark.processes
 
@@ -129,7 +131,36 @@ def test_kill_costs_a_second_at_most(bench, tmp_path):
     process.wait()
     stamps = recorded_stamps(tmp_path / 'bag')
     assert last - stamps[-1] < 1e9
+    metadata = yaml.safe_load((tmp_path / 'bag' / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
+    with Recording(tmp_path / 'bag') as recording:
+        assert 0 < metadata['message_count'] <= sum(map(recording.count, recording.topics))
     assert stamps == sorted(stamps)
+
+
+def test_metadata_of_a_recorder_at_work_count_what_the_disk_has(tmp_path):
+    """A killed recorder leaves them: `ros2 bag info` believes them, and `ros2 bag play` opens nothing without."""
+    recorder = Recorder(tmp_path / 'bag')
+    flags = recorder.add_topic('/synchronized', 'std_msgs/msg/Bool', [offered_qos(True, True, 1)])
+
+    def metadata():
+        return yaml.safe_load((tmp_path / 'bag' / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
+
+    for count in (1, 2, 3):
+        recorder.write(flags, b'\0\1\0\0\1\0\0\0', count * 10**9)
+        end = time.monotonic() + PATIENCE
+        while not (tmp_path / 'bag' / 'metadata.yaml').exists() or metadata()['message_count'] < count:
+            assert time.monotonic() < end
+            recorder.flush()
+        told = metadata()
+        with Recording(tmp_path / 'bag') as recording:
+            assert recording.count(flags) == count
+        assert told['message_count'] == told['topics_with_message_count'][0]['message_count'] == count
+        assert told['duration']['nanoseconds'] == told['files'][0]['duration']['nanoseconds'] == (count - 1) * 10**9
+    recorder.add_topic('/synchronized', 'std_msgs/msg/Bool', [offered_qos(False, False)])
+    recorder.close()
+    (topic,) = metadata()['topics_with_message_count']
+    assert topic['message_count'] == 3
+    assert [profile['reliability'] for profile in topic['topic_metadata']['offered_qos_profiles']] == ['best_effort']
 
 
 def test_full_disk_ends_the_recording_and_keeps_what_is_there(bench, tmp_path):
