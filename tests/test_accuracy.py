@@ -1,4 +1,4 @@
-"""The estimator against the simulation: noise of 0.2°, 5 % of the samples lost, 200 Hz, 100 trials of 12 s."""
+"""The estimator against the simulation: noise of 0.2°, 5 % of the samples lost, 200 Hz, 12 s a trial."""
 
 import math
 

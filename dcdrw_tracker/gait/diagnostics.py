@@ -30,7 +30,7 @@ from dcdrw_msgs_py.diagnosis import (
 from dcdrw_msgs_py.words import counted
 from dcdrw_tracker.gait.cadence import CadenceStatus
 from dcdrw_tracker.gait.pair_state import judge
-from dcdrw_tracker.gait.phase import Hint, PhaseStatus, Refusal
+from dcdrw_tracker.gait.phase import LARGEST_ROTATION, Hint, PhaseStatus, Refusal
 from dcdrw_tracker.gait.sync import SyncStatus
 
 
@@ -185,13 +185,13 @@ _HINTS: dict[Hint, str] = {
     'whole, in seconds and nanoseconds? (of stamps that are all zero, the time of arrival counts)',
     'revolutions': 'the wheels turn slower than they can roll: are their rotations in revolutions? '
     '(parameter unit; of a film in slow motion, its frame rate)',
-    'unit': 'the wheels turn faster than they can roll: are their rotations in degrees? '
-    '(parameter unit; of a film, its frame rate)',
+    'unit': 'a wheel turns faster than it can roll: are the rotations in degrees? '
+    '(parameter unit, of both wheels; of a film, its frame rate)',
 }
 REFUSALS: dict[Refusal, str] = {
     'unreadable': 'a wheel is missing, or the message is malformed (see the parameters front_joint and rear_joint)',
     'unpaired': "each wheel comes in messages of its own, and the rear one's stay away",
-    'not finite': 'a rotation is not a finite number',
+    'not finite': f'a rotation is not finite, or beyond {LARGEST_ROTATION:g} rad',
     'repeated': 'the stamp stands still',
     'reversed': 'the stamp goes back',
     'future': "the stamp lies ahead of this node's clock (do the machines' clocks agree? is use_sim_time the same?)",

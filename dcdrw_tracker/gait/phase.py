@@ -37,6 +37,8 @@ FAR_AHEAD = 5
 """A wheel that has taken so many more steps than the other, and a quarter more, has another gear or other spokes."""
 REMEMBERED = 100
 """Restarts and clock steps of which the particulars are kept."""
+RECENT = 64
+"""Samples among which one that comes again is known, as over a second way of the network."""
 LEAST_CLOCK_STEP_NS = 200_000_000
 """A jump of the stamps by less is as good as a gap."""
 BURSTS_NS = 1_000_000_000
@@ -214,6 +216,7 @@ class PhaseEstimator:
     def reset(self) -> None:
         """Start afresh with the next sample (n = 0); the counts of samples stay."""
         self._last: JointSample | None = None
+        self._recent: deque[JointSample] = deque(maxlen=RECENT)
         self._held: list[_Held] = []
         self._clock_ns = self._arrived_ns = self._begun_ns = self._begun_now_ns = 0
         self._front = self._rear = Rotation(self.params.front.alpha, 0, 0.0, math.nan, self._tolerance)
@@ -297,9 +300,9 @@ class PhaseEstimator:
                     self._arrived_ns = arrival_ns
                     return update
             return self._hold(joints, 'outlier', arrival_ns)
-        if elapsed_ns == 0 and (joints.front.angle, joints.rear.angle) == (last.front.angle, last.rear.angle):
+        if self._came_before(joints):
             self._duplicates += 1
-            self._refusal = 'repeated'
+            self._refusal = 'reversed' if elapsed_ns else 'repeated'
             return None
         if elapsed_ns == 0 or (self._held and stamp_ns == self._held[-1].joints.stamp_ns):
             self.refuse('repeated')
@@ -326,6 +329,14 @@ class PhaseEstimator:
             clock_steps=tuple(self._clock_steps),
             restarted=tuple(self._restarted),
             hints=self._hints(),
+        )
+
+    def _came_before(self, joints: JointSample) -> bool:
+        """Whether this is one of the last samples again; speeds tell nothing, for NaN equals nothing."""
+        stamp_ns, front, rear, *_ = joints
+        return any(
+            stamp_ns == one.stamp_ns and front.angle == one.front.angle and rear.angle == one.rear.angle
+            for one in self._recent
         )
 
     def _resolve(self, joints: JointSample) -> None:
@@ -458,6 +469,7 @@ class PhaseEstimator:
         """The phase where the wheels are now: φ from ψ alone (contract §1)."""
         self._accepted += 1
         self._last = joints
+        self._recent.append(joints)
         self._refusal = None
         if self._held:
             self._held = []
@@ -581,11 +593,11 @@ class PhaseEstimator:
         return PhaseUpdate(phases[-1], footfalls, 0, tuple(phases[:-1]))
 
     def _moves_too_fast(self, earlier: JointSample, later: JointSample) -> bool:
-        """Whether both wheels seem to turn as fast as they would if degrees were taken for radians."""
+        """Whether a wheel seems to turn as fast as it would if degrees were taken for radians."""
         dt = (later.stamp_ns - earlier.stamp_ns) * 1e-9
         if self.params.unit != 'rad' or dt <= 0.0:
             return False
-        return all(
+        return any(
             self.params.max_speed < abs(there.angle - here.angle) / dt <= _fastest_rolling(shape) / UNITS['deg']
             for shape, here, there in (
                 (self.params.front, earlier.front, later.front),

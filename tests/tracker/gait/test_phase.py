@@ -440,15 +440,17 @@ def test_a_simulated_clock_may_start_at_zero() -> None:
 
 
 @pytest.mark.parametrize('rate', [0.0, math.nan])
-def test_a_message_that_comes_twice_counts_once_with_speeds_or_without(rate: float) -> None:
+@pytest.mark.parametrize('later', [0, 1, 5, 40])
+def test_a_message_that_comes_twice_counts_once_with_speeds_or_without(rate: float, later: int) -> None:
     estimator = PhaseEstimator(PARAMS)
-    for sample in walk(2.0).samples():
-        for _ in range(2):
+    samples = walk(2.0).samples()
+    for place in range(len(samples) + later):
+        for sample in (*samples[place : place + 1], *samples[max(place - later, 0) : max(place - later + 1, 0)]):
             front, rear = (turn._replace(rate=turn.rate + rate) for turn in (sample.front, sample.rear))
             estimator.update(sample._replace(front=front, rear=rear))
     status = estimator.status()
-    assert status.duplicates == status.accepted
-    assert not status.refusals
+    assert (status.accepted, status.duplicates) == (len(samples), len(samples))
+    assert (status.refusals, status.restarts, status.cadence.lost) == ({}, 0, 0)
 
 
 SIGNS = st.sampled_from([1, -1])
@@ -484,15 +486,19 @@ def test_a_wrong_sign_is_told_by_the_parameter_that_mends_it(front: int, rear: i
 @pytest.mark.parametrize('rate', [50.0, 200.0, 1000.0])
 @pytest.mark.parametrize('rates', [True, False])
 def test_degrees_are_told_by_the_parameter_that_mends_them(rate: float, rates: bool) -> None:
-    samples = [
-        s._replace(
-            front=Turn(math.degrees(s.front.angle), math.degrees(s.front.rate)),
-            rear=Turn(math.degrees(s.rear.angle), math.degrees(s.rear.rate)),
-        )
-        for s in walk(6.0, rate).samples(rates=rates)
-    ]
-    assert 'unit' in run(samples)[2].hints
-    assert run(samples, PhaseParams(unit='deg'))[2].hints == ()
+    samples = walk(6.0, rate).samples(rates=rates)
+    of_both = [s._replace(front=in_degrees(s.front), rear=in_degrees(s.rear)) for s in samples]
+    assert 'unit' in run(of_both)[2].hints
+    assert run(of_both, PhaseParams(unit='deg'))[2].hints == ()
+    for of_one in (
+        [s._replace(front=in_degrees(s.front)) for s in samples],
+        [s._replace(rear=in_degrees(s.rear)) for s in samples],
+    ):
+        assert 'unit' in run(of_one)[2].hints
+
+
+def in_degrees(turn: Turn) -> Turn:
+    return Turn(math.degrees(turn.angle), math.degrees(turn.rate))
 
 
 # --- bursts and counters --------------------------------------------------------------------------------------------
