@@ -17,6 +17,8 @@ from dcdrw_tracker.gait.phase import Restart
 
 ANOTHER_PACE = 1.25
 """Stamps that pass so many times as fast as the recording, or as slowly, go by another clock; no delay does that."""
+MANY_STRAYS = 0.005
+"""The share of wild samples from which on the verdict rests on less: a few cost nothing."""
 MANY_DISBELIEVED = 0.1
 """The share of the samples from which on it is said that their speeds are not used; fewer lie around gaps."""
 
@@ -63,7 +65,7 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
             told[why] if count == refused else f'{counted(count, "time")} {told[why]}'
             for why, count in estimator.refusals.items()
         )
-        of = estimator.accepted + estimator.duplicates + refused
+        of = estimator.accepted + estimator.strays + estimator.duplicates + refused
         yield Remark(
             f'{refused} of {counted(of, "joint state")} {by_count(refused, "was", "were")} refused: {reasons}.', True
         )
@@ -110,10 +112,12 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         yield Remark(
             f'The clock of the source was set {by} while the wheels rolled on; this is undone, and nothing left out.'
         )
-    if trial.status.strays:
+    strays = estimator.strays + trial.status.strays
+    if strays:
         yield Remark(
-            f'{counted(trial.status.strays, "sample")} lay apart from both neighbours, and '
-            f'{by_count(trial.status.strays, "is", "are")} passed over.'
+            f'{counted(strays, "sample")} lay apart from both neighbours, and {by_count(strays, "is", "are")} passed '
+            'over.',
+            strays > MANY_STRAYS * trial.samples,
         )
     if estimator.rollovers:
         yield Remark(

@@ -32,6 +32,8 @@ class Samples(NamedTuple):
     """Messages that name neither wheel."""
     unstamped: int
     """Without a stamp, so that the time of recording took its place."""
+    strays: int
+    """Wild ones, apart from those before and after, which are passed over."""
     duplicates: int
     """Joint states that came again as they were, which costs nothing."""
     rollovers: int
@@ -128,6 +130,7 @@ def summarize(trial: Analysis) -> Summary:
             clock_steps=trial.estimator.clock_steps,
             foreign=trial.estimator.foreign,
             unstamped=trial.estimator.unstamped,
+            strays=trial.estimator.strays + trial.status.strays,
             duplicates=trial.estimator.duplicates,
             rollovers=trial.estimator.rollovers,
             hints=trial.estimator.hints,

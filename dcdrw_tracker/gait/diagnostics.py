@@ -96,6 +96,7 @@ def diagnose_phase(status: PhaseStatus, age: float, stale_after: float) -> Diagn
             RESTARTS: status.restarts,
             'messages that name neither wheel': status.foreign,
             'samples without a stamp': status.unstamped,
+            'lone wild samples': status.strays,
             'samples that came twice': status.duplicates,
             'times the clock of the source was set': len(status.clock_steps),
             'times the counter of an encoder rolled over': status.rollovers,

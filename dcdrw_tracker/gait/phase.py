@@ -150,7 +150,7 @@ class PhaseStatus(NamedTuple):
     """Stamp of the last sample that was accepted; 0 where there was none."""
     accepted: int
     refused: dict[Refusal, int]
-    """How many were refused for good, by the reason; with those accepted and the duplicates, all that came."""
+    """How many were refused for good, by the reason; with those accepted, strays and duplicates, all that came."""
     refusal: Refusal | None
     """Why samples are refused now; None since one was accepted."""
     cadence: CadenceStatus
@@ -165,6 +165,8 @@ class PhaseStatus(NamedTuple):
     """Samples whose stamp was missing (zero), so that the time of their arrival took its place."""
     foreign: int = 0
     """Messages that name neither wheel, and so are none of this rig's."""
+    strays: int = 0
+    """Lone wild samples, apart from those before and after, which are passed over."""
     duplicates: int = 0
     """Samples that came again as they were, and so cost nothing."""
     disbelieved: int = 0
@@ -198,7 +200,7 @@ class PhaseEstimator:
         self._cadence = Cadence()
         self._refused: dict[Refusal, int] = dict.fromkeys(get_args(Refusal), 0)
         self._refusal: Refusal | None = None
-        self._accepted = self._unstamped = self._foreign = self._duplicates = self._too_fast = 0
+        self._accepted = self._unstamped = self._foreign = self._duplicates = self._strays = self._too_fast = 0
         self._slow_strikes: int | None = 0
         self._restarts = self._rolled_before = self._now_ns = 0
         self._restarted: deque[Restart] = deque(maxlen=REMEMBERED)
@@ -218,6 +220,7 @@ class PhaseEstimator:
         self._last: JointSample | None = None
         self._recent: deque[JointSample] = deque(maxlen=RECENT)
         self._held: list[_Held] = []
+        self._wild: _Wild | None = None
         self._clock_ns = self._arrived_ns = self._begun_ns = self._begun_now_ns = 0
         self._front = self._rear = Rotation(self.params.front.alpha, 0, 0.0, math.nan, self._tolerance)
         self._n_uncertain = False
@@ -293,8 +296,10 @@ class PhaseEstimator:
             # While outliers are held, a sample that could go on from either belongs to the nearer.
             stray = self._held[-1].joints if self._held and self._held[-1].why == 'outlier' else None
             if stray is None or self._apart(joints, last) <= self._apart(joints, stray):
-                update = self._follow(joints, elapsed_ns * 1e-9)
-                if update:
+                dt = elapsed_ns * 1e-9
+                reached = self._reach(joints, dt)
+                if reached:
+                    update = self._unless_wild(joints, dt, reached)
                     if arrival_ns - self._arrived_ns > PASSED_NS:  # a pause tells nothing of the clocks
                         self._begun_ns, self._begun_now_ns = stamp_ns, now_ns
                     self._arrived_ns = arrival_ns
@@ -324,6 +329,7 @@ class PhaseEstimator:
             rollovers=self._rolled_before + self._front.rollovers + self._rear.rollovers,
             unstamped=self._unstamped,
             foreign=self._foreign,
+            strays=self._strays,
             duplicates=self._duplicates,
             disbelieved=max(self._front.disbelieved, self._rear.disbelieved),
             clock_steps=tuple(self._clock_steps),
@@ -445,11 +451,44 @@ class PhaseEstimator:
 
     def _follow(self, joints: JointSample, dt: float) -> PhaseUpdate | None:
         """Move both wheels on by a sample that is dt seconds later; None where they cannot get there."""
+        reached = self._reach(joints, dt)
+        return self._move(joints, dt, reached) if reached else None
+
+    def _reach(self, joints: JointSample, dt: float) -> tuple[float, float] | None:
+        """The rotations ψ of both wheels that a sample means; None where they cannot get there within dt seconds."""
+        front = self._front.continued(joints.front.angle, dt, self._tolerance)
+        rear = self._rear.continued(joints.rear.angle, dt, self._tolerance)
+        return None if front is None or rear is None else (front, rear)
+
+    def _unless_wild(self, joints: JointSample, dt: float, reached: tuple[float, float]) -> PhaseUpdate | None:
+        """Move on by a sample, but by a wild one only with the next, if that goes with it: one alone is passed over."""
+        wild, self._wild = self._wild, None
         front, rear, tolerance = self._front, self._rear, self._tolerance
-        front_psi = front.continued(joints.front.angle, dt, tolerance)
-        rear_psi = rear.continued(joints.rear.angle, dt, tolerance)
-        if front_psi is None or rear_psi is None:
-            return None
+        # Both learn from each sample how far off is usual.
+        if not front.is_wild(reached[0], dt, tolerance) | rear.is_wild(reached[1], dt, tolerance):
+            return self._move(joints, dt, reached)
+        if wild and wild.in_row >= self.params.restart_samples:
+            return self._move(joints, dt, reached)
+        if (
+            wild
+            and front.agree(wild.reached[0], wild.dt, reached[0], dt, tolerance)
+            and rear.agree(wild.reached[1], wild.dt, reached[1], dt, tolerance)
+        ):
+            self._strays -= 1
+            first = self._move(wild.joints, wild.dt, wild.reached)
+            second = self._follow(joints, dt - wild.dt)
+            if second is None:
+                self.refuse('outlier')
+                return first
+            return second._replace(footfalls=first.footfalls + second.footfalls, held=(first.phase,))
+        self._strays += 1
+        self._wild = _Wild(joints, dt, reached, 1 + (wild.in_row if wild else 0))
+        return None
+
+    def _move(self, joints: JointSample, dt: float, reached: tuple[float, float]) -> PhaseUpdate:
+        """Move both wheels on to where a sample, dt seconds later, has them."""
+        front, rear, tolerance = self._front, self._rear, self._tolerance
+        front_psi, rear_psi = reached
         stamp_ns, front_raw, rear_raw, _, run = joints
         if not run and (front.may_step(dt) or rear.may_step(dt)):
             self._n_uncertain = True
@@ -492,6 +531,7 @@ class PhaseEstimator:
     def _hold(self, joints: JointSample, why: Refusal, arrival_ns: int) -> PhaseUpdate | None:
         """Refuse a sample for now; go on from it, or start anew, where enough of them agree."""
         self.refuse(why)
+        self._wild = None
         held = self._held
         if held:
             latest = held[-1].joints
@@ -631,6 +671,18 @@ class PhaseEstimator:
         ]
         falls += [Footfall(REAR, stamp_ns + clock_ns, n2 * rig.rear.step_length, n2) for stamp_ns, n2 in rear]
         return tuple(sorted(falls, key=lambda fall: fall.stamp_ns))
+
+
+class _Wild(NamedTuple):
+    """A sample that is passed over unless the next one goes with it."""
+
+    joints: JointSample
+    dt: float
+    """Time since the last sample that was taken [s]."""
+    reached: tuple[float, float]
+    """The rotations ψ that it means [rad]."""
+    in_row: int
+    """How many came one after the other, none of which goes with another."""
 
 
 class _Held(NamedTuple):

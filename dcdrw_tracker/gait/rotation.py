@@ -21,8 +21,16 @@ LEAST_PACE = 0.05
 """A wheel that is slower does not tell whether the speeds that its source gives are right [rad/s]."""
 LEARNING = 500
 """Samples of a moving wheel from which the count is learned."""
+PROOF = 4
+"""So many moves on must be multiples of a count before it tells how far a counter reaches."""
 LEAST_WIDTH = 1e-3
 """Less is rounding, and no counter that rolls over [rad]."""
+WILD = 7.0
+"""So many times as far off as usual is a rotation that is wild."""
+FINEST = 0.1
+"""Nor is one wild that is less off than this share of the hysteresis."""
+FEWEST_USUAL, MOST_USUAL = 3, 50
+"""Samples from which it is told how far off rotations usually are: how much the hysteresis counts, and how many do."""
 FEWEST_BITS = 8
 """No counter of an encoder rolls over after fewer counts than two to this power."""
 
@@ -85,8 +93,13 @@ class Rotation:
         self._unlearned = LEARNING
         self._count = math.inf
         """Angle of one count of the source's encoder; infinite before the wheel has turned, 0 where there is none."""
+        self._proof = 0
+        """Moves since that count was found."""
         self._width = math.nan
         """By how much the source's counter was seen to roll over [rad]; NaN where it was not yet."""
+        self._usual = tolerance.hysteresis
+        """How far rotations are off, in the mean, from where the speed takes the wheel [rad]."""
+        self._of = FEWEST_USUAL
         self.rollovers = 0
         """How often the source's counter has rolled over."""
         self.is_zero_known = True
@@ -162,6 +175,34 @@ class Rotation:
                 lost = whole
         return angle + (self._offset + lost) if low <= moved + lost <= high else None
 
+    def is_wild(self, psi: float, dt: float, tolerance: Tolerance) -> bool:
+        """Whether a rotation is far off, dt seconds on: by more than a change of speed, noise or counts explain."""
+        if math.isnan(self.rate):
+            return False
+        moved = psi - self.psi
+        # Just after a strike the rate is that of two noisy samples.
+        off = min(abs(moved - self.rate * dt), abs(moved - self.pace * dt))
+        bound, usual = self._off_at_most(dt, tolerance), self._usual
+        self._usual += (min(off, 4.0 * usual) - usual) / self._of
+        self._of = min(self._of + 1, MOST_USUAL)
+        return off > bound
+
+    def agree(self, psi: float, dt: float, later_psi: float, later_dt: float, tolerance: Tolerance) -> bool:
+        """Whether two rotations that are wild go with each other: as after a jump, or at another speed."""
+        between = later_dt - dt
+        moved = later_psi - psi
+        off = abs(moved - self.rate * between)
+        speed = (psi - self.psi) / dt
+        if abs(speed) <= tolerance.max_speed:
+            off = min(off, abs(moved - speed * between))
+        return off <= self._off_at_most(between, tolerance)
+
+    def _off_at_most(self, dt: float, tolerance: Tolerance) -> float:
+        """How far noise, the counts of an encoder, and a change of speed, also by a strike, carry a rotation [rad]."""
+        count = self._count if self._count < math.inf else 0.0
+        changed = 0.5 * abs(self.rate) * dt + 0.5 * QUICKEST * dt * dt
+        return max(WILD * self._usual, FINEST * tolerance.hysteresis, 2.0 * count) + changed
+
     def _rolled_over(self, angle: float, dt: float, tolerance: Tolerance) -> float:
         """What a counter has lost that rolled over: whole turns, 2ᵏ counts, or all from one end to the other; or 0.
 
@@ -186,7 +227,7 @@ class Rotation:
 
     def _counter(self, jump: float) -> float:
         """How far a counter of 2ᵏ counts reaches that may have jumped so far [rad]; 0 where there is none."""
-        counts = jump / self._count if self._count else 0.0
+        counts = jump / self._count if self._count and self._proof >= PROOF else 0.0
         bits = round(math.log2(counts)) if counts >= 1.0 else 0
         return self._count * 2.0**bits if bits >= FEWEST_BITS else 0.0
 
@@ -219,7 +260,9 @@ class Rotation:
             self._wraps = False
         if turned and self._unlearned:
             self._unlearned -= 1
-            self._count = common_divisor(self._count, abs(turned), LEAST_COUNT)
+            count = common_divisor(self._count, abs(turned), LEAST_COUNT)
+            self._proof = self._proof + 1 if math.isclose(count, self._count, rel_tol=0.01) else 0
+            self._count = count
         strikes = self._strikes(elapsed_ns, psi, tolerance.hysteresis)
         memory = dt if dt > PACE_MEMORY else PACE_MEMORY
         self.pace += (moved - self.pace * dt) / memory

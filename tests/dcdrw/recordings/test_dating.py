@@ -31,6 +31,13 @@ NONE: dict[str, Times] = {
     'one stamp for all': np.full_like(EPOCH, SECOND),
     'zero': np.zeros_like(EPOCH),
 }
+
+def _held_up(log: Times) -> Times:
+    """Times at which a recorder writes that gets the processor seldom: it first catches up, then waits for each."""
+    behind = np.maximum(4 * SECOND - SINCE * 4, 0)
+    return log[0] + np.maximum.accumulate(SINCE + behind)
+
+
 TIMES: dict[str, Callable[[Times], tuple[Times, Times]]] = {
     'another epoch': lambda log: (SINCE, log),
     'twice as fast': lambda log: (2 * SINCE, log),
@@ -39,6 +46,8 @@ TIMES: dict[str, Callable[[Times], tuple[Times, Times]]] = {
     'a clock that is set': lambda log: (np.where(SINCE > 5 * SECOND, EPOCH - 37 * SECOND, EPOCH), log),
     'a simulation as fast as it can': lambda log: (EPOCH, log[0] + SINCE // 300),
     'a recorder that pauses': lambda log: (EPOCH, -(-log // SECOND) * SECOND),
+    'a recorder that is held up': lambda log: (EPOCH, _held_up(log)),
+    'a recorder whose clock ran off once': lambda log: (EPOCH, np.where(SINCE == 0, log, log + 2**61)),
     'a recorder that knows no time': lambda log: (EPOCH, np.zeros_like(log)),
 }
 
@@ -54,6 +63,17 @@ def test_stamps_that_tell_no_time_give_way_to_the_time_of_recording(stamps: Time
     times, unstamped = whole([WALK._replace(stamp_ns=stamps, log_ns=EPOCH)])
     assert times.tolist() == EPOCH.tolist()
     assert unstamped == len(EPOCH)
+
+
+@pytest.mark.parametrize('first', [0, 100, 130])
+@pytest.mark.parametrize('last', [180, 320, len(EPOCH)])
+def test_stamps_that_stand_still_for_a_while_go_on_by_the_time_of_recording(first: int, last: int) -> None:
+    stamps = EPOCH.copy()
+    stamps[first:last] = EPOCH[last if first == 0 and last < len(EPOCH) else first]
+    times, unstamped = whole([WALK._replace(stamp_ns=stamps, log_ns=EPOCH + 7)])
+    assert np.abs(times - EPOCH).max() <= 7
+    assert unstamped == np.count_nonzero(times != stamps)
+    assert last - first - 1 <= unstamped <= last - first
 
 
 @pytest.mark.parametrize('clocks', TIMES.values(), ids=TIMES)

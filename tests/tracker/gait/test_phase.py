@@ -501,6 +501,42 @@ def in_degrees(turn: Turn) -> Turn:
     return Turn(math.degrees(turn.angle), math.degrees(turn.rate))
 
 
+@pytest.mark.parametrize('rate', [60.0, 200.0, 1000.0])
+@pytest.mark.parametrize('size', [0.05, 0.2, 3.0])
+@pytest.mark.parametrize('rates', [True, False])
+def test_one_wild_sample_in_a_hundred_changes_no_other(rate: float, size: float, rates: bool) -> None:
+    """Each lies apart from both neighbours; what is told of all others is as without it."""
+    random = np.random.default_rng(7)
+    samples = walk(15.0, rate).samples(0.01, 3, rates)
+    wild = 2 * np.flatnonzero(random.random(len(samples) // 2 - 30) < 0.02) + 50
+    bent = samples.copy()
+    for place in wild:
+        off = size * random.uniform(0.8, 1.2) * random.choice([-1.0, 1.0])
+        front, rear = samples[place][1:3]
+        if random.random() < 0.5:
+            front = front._replace(angle=front.angle + off)
+        else:
+            rear = rear._replace(angle=rear.angle + off)
+        bent[place] = samples[place]._replace(front=front, rear=rear)
+    phases, falls, status = run(bent)
+    plain, plain_falls, _ = run(samples)
+    assert status.strays + sum(status.refused.values()) == len(wild)
+    assert status.restarts == 0
+    assert [fall[::3] for fall in falls] == [fall[::3] for fall in plain_falls]  # which wheel, and its steps
+    told = {phase.stamp_ns: phase.phi.angle for phase in plain}
+    assert {phase.stamp_ns: phase.phi.angle for phase in phases} == {
+        phase.stamp_ns: told[phase.stamp_ns] for phase in phases
+    }
+
+
+@pytest.mark.parametrize('rates', [True, False])
+def test_a_wheel_that_jumps_and_goes_on_loses_no_sample(rates: bool) -> None:
+    samples = walk(6.0, 200.0).samples(0.01, 3, rates)
+    jumped = samples[:600] + [s._replace(front=s.front._replace(angle=s.front.angle + 0.06)) for s in samples[600:]]
+    phases, _, status = run(jumped)
+    assert (len(phases), status.strays, status.refusals, status.restarts) == (len(samples), 0, {}, 0)
+
+
 # --- bursts and counters --------------------------------------------------------------------------------------------
 
 
