@@ -109,7 +109,7 @@ def _dated(
 
 def _carried_on(stamp_ns: Times, log_ns: Times, turns: Floats) -> Times:
     """Stamps, of which those that stand still while the wheels turn [rad] go on as the recording did."""
-    times = stamp_ns.copy()
+    times: Times = stamp_ns.copy()
     begins = np.flatnonzero(np.diff(stamp_ns, prepend=stamp_ns[0] - 1))
     ends = np.append(begins[1:], len(stamp_ns))
     still = np.column_stack([begins, ends])[log_ns[ends - 1] - log_ns[begins] >= STILL_NS]

@@ -5,7 +5,6 @@ Plain data in, plain data out: time arrives in the samples, and what is refused 
 
 import math
 from collections import deque
-from itertools import pairwise
 from typing import Annotated, Literal, NamedTuple, get_args
 
 from dcdrw_msgs_py.quantity import Quantity
@@ -220,7 +219,7 @@ class PhaseEstimator:
         self._last: JointSample | None = None
         self._recent: deque[JointSample] = deque(maxlen=RECENT)
         self._held: list[_Held] = []
-        self._wild: _Wild | None = None
+        self._wild: tuple[_Wild, ...] = ()
         self._clock_ns = self._arrived_ns = self._begun_ns = self._begun_now_ns = 0
         self._front = self._rear = Rotation(self.params.front.alpha, 0, 0.0, math.nan, self._tolerance)
         self._n_uncertain = False
@@ -296,10 +295,8 @@ class PhaseEstimator:
             # While outliers are held, a sample that could go on from either belongs to the nearer.
             stray = self._held[-1].joints if self._held and self._held[-1].why == 'outlier' else None
             if stray is None or self._apart(joints, last) <= self._apart(joints, stray):
-                dt = elapsed_ns * 1e-9
-                reached = self._reach(joints, dt)
-                if reached:
-                    update = self._unless_wild(joints, dt, reached)
+                update = self._advance(joints, elapsed_ns * 1e-9)
+                if update or self._wild:
                     if arrival_ns - self._arrived_ns > PASSED_NS:  # a pause tells nothing of the clocks
                         self._begun_ns, self._begun_now_ns = stamp_ns, now_ns
                     self._arrived_ns = arrival_ns
@@ -460,30 +457,64 @@ class PhaseEstimator:
         rear = self._rear.continued(joints.rear.angle, dt, self._tolerance)
         return None if front is None or rear is None else (front, rear)
 
-    def _unless_wild(self, joints: JointSample, dt: float, reached: tuple[float, float]) -> PhaseUpdate | None:
-        """Move on by a sample, but by a wild one only with the next, if that goes with it: one alone is passed over."""
-        wild, self._wild = self._wild, None
+    def _advance(self, joints: JointSample, dt: float) -> PhaseUpdate | None:
+        """Move on by a sample, unless no wheel gets there, or it is wild: then it waits for the next ones.
+
+        It is believed with the next one, if they are in line, or the two next, where the wheel would turn too fast, as
+        by the stamps of a burst. One alone is passed over.
+        """
+        wild, self._wild = self._wild, ()
+        reached = self._reach(joints, dt)
+        if reached is None:
+            return self._believe(wild, joints) if wild and self._goes_on_from(wild[-1], joints, dt) else None
         front, rear, tolerance = self._front, self._rear, self._tolerance
-        # Both learn from each sample how far off is usual.
-        if not front.is_wild(reached[0], dt, tolerance) | rear.is_wild(reached[1], dt, tolerance):
+        # Each wheel learns from each sample how far off is usual.
+        is_wild = front.is_wild(reached[0], dt, tolerance) | rear.is_wild(reached[1], dt, tolerance)
+        if not (wild or is_wild):
             return self._move(joints, dt, reached)
-        if wild and wild.in_row >= self.params.restart_samples:
-            return self._move(joints, dt, reached)
-        if (
-            wild
-            and front.agree(wild.reached[0], wild.dt, reached[0], dt, tolerance)
-            and rear.agree(wild.reached[1], wild.dt, reached[1], dt, tolerance)
-        ):
-            self._strays -= 1
-            first = self._move(wild.joints, wild.dt, wild.reached)
-            second = self._follow(joints, dt - wild.dt)
-            if second is None:
-                self.refuse('outlier')
-                return first
-            return second._replace(footfalls=first.footfalls + second.footfalls, held=(first.phase,))
+        in_row = wild[-1].in_row + 1 if wild else 1
+        if wild and not self._are_in_line(wild[-1], reached, dt):
+            wild = ()
+        fastest = max(abs(reached[0] - front.psi), abs(reached[1] - rear.psi)) / dt
+        enough = 2 if fastest > tolerance.max_speed else 1
+        if not is_wild or len(wild) >= enough or in_row > self.params.restart_samples:
+            return self._believe(wild, joints)
         self._strays += 1
-        self._wild = _Wild(joints, dt, reached, 1 + (wild.in_row if wild else 0))
+        self._wild = (*wild, _Wild(joints, dt, reached, in_row))
         return None
+
+    def _goes_on_from(self, before: '_Wild', joints: JointSample, dt: float) -> bool:
+        """Whether a sample that the wheels only reach by way of a wild one goes with that."""
+        front, rear = (
+            psi + now.angle - then.angle
+            for psi, now, then in zip(before.reached, joints[1:3], before.joints[1:3], strict=True)
+        )
+        return self._are_in_line(before, (front, rear), dt)
+
+    def _are_in_line(self, before: '_Wild', reached: tuple[float, float], dt: float) -> bool:
+        """Whether two wild samples go with each other: both wheels jumped and go on, or have another speed."""
+        return all(
+            wheel.are_in_line(psi, before.dt, later, dt, self._tolerance)
+            for wheel, psi, later in zip((self._front, self._rear), before.reached, reached, strict=True)
+        )
+
+    def _believe(self, wild: tuple['_Wild', ...], joints: JointSample) -> PhaseUpdate | None:
+        """Follow samples that had to wait, and the one with which they go."""
+        self._strays -= len(wild)
+        return self._follow_all([*(one.joints for one in wild), joints], 'outlier')
+
+    def _follow_all(self, samples: list[JointSample], why: Refusal) -> PhaseUpdate | None:
+        """Move on by one sample after the other, and refuse those at which the wheels do not get; None for all."""
+        phases: list[PhaseSample] = []
+        footfalls: tuple[Footfall, ...] = ()
+        for joints in samples:
+            assert self._last
+            if followed := self._follow(joints, (joints.stamp_ns - self._last.stamp_ns) * 1e-9):
+                phases.append(followed.phase)
+                footfalls += followed.footfalls
+            else:
+                self.refuse(why)
+        return PhaseUpdate(phases[-1], footfalls, self._clock_ns, tuple(phases[:-1])) if phases else None
 
     def _move(self, joints: JointSample, dt: float, reached: tuple[float, float]) -> PhaseUpdate:
         """Move both wheels on to where a sample, dt seconds later, has them."""
@@ -531,7 +562,7 @@ class PhaseEstimator:
     def _hold(self, joints: JointSample, why: Refusal, arrival_ns: int) -> PhaseUpdate | None:
         """Refuse a sample for now; go on from it, or start anew, where enough of them agree."""
         self.refuse(why)
-        self._wild = None
+        self._wild = ()
         held = self._held
         if held:
             latest = held[-1].joints
@@ -583,20 +614,11 @@ class PhaseEstimator:
 
     def _adopt(self, held: list['_Held']) -> PhaseUpdate | None:
         """Follow samples that were held back."""
-        assert self._last
         self._unrefuse(held)
-        phases: list[PhaseSample] = []
-        footfalls: tuple[Footfall, ...] = ()
         for one in held:
-            dt = (one.joints.stamp_ns - self._last.stamp_ns) * 1e-9
             self._cadence.tick(one.joints.stamp_ns)
-            if followed := self._follow(one.joints, dt):
-                phases.append(followed.phase)
-                footfalls += followed.footfalls
-            else:
-                self.refuse(one.why)
         self._arrived_ns = held[-1].arrival_ns
-        return PhaseUpdate(phases[-1], footfalls, self._clock_ns, tuple(phases[:-1])) if phases else None
+        return self._follow_all([one.joints for one in held], held[0].why)
 
     def _unrefuse(self, held: list['_Held']) -> None:
         for one in held:
@@ -622,15 +644,9 @@ class PhaseEstimator:
         samples = [one.joints._replace(stamp_ns=one.joints.stamp_ns + clock_ns) for one in held]
         self._arrived_ns = held[-1].arrival_ns
         self._cadence.jump(samples[-1].stamp_ns)
-        phases = [self._start(samples[0]).phase]
-        footfalls: tuple[Footfall, ...] = ()
-        for earlier, later in pairwise(samples):
-            if followed := self._follow(later, (later.stamp_ns - earlier.stamp_ns) * 1e-9):
-                phases.append(followed.phase)
-                footfalls += followed.footfalls
-            else:
-                self.refuse('outlier')
-        return PhaseUpdate(phases[-1], footfalls, 0, tuple(phases[:-1]))
+        start = self._start(samples[0])
+        rest = self._follow_all(samples[1:], 'outlier')
+        return rest._replace(held=(start.phase, *rest.held)) if rest else start
 
     def _moves_too_fast(self, earlier: JointSample, later: JointSample) -> bool:
         """Whether a wheel seems to turn as fast as it would if degrees were taken for radians."""
@@ -674,7 +690,7 @@ class PhaseEstimator:
 
 
 class _Wild(NamedTuple):
-    """A sample that is passed over unless the next one goes with it."""
+    """A sample that is passed over unless the next ones go with it."""
 
     joints: JointSample
     dt: float
@@ -682,7 +698,7 @@ class _Wild(NamedTuple):
     reached: tuple[float, float]
     """The rotations ψ that it means [rad]."""
     in_row: int
-    """How many came one after the other, none of which goes with another."""
+    """How many came one after the other."""
 
 
 class _Held(NamedTuple):

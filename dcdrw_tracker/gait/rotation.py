@@ -177,24 +177,26 @@ class Rotation:
 
     def is_wild(self, psi: float, dt: float, tolerance: Tolerance) -> bool:
         """Whether a rotation is far off, dt seconds on: by more than a change of speed, noise or counts explain."""
-        if math.isnan(self.rate):
-            return False
         moved = psi - self.psi
+        off = abs(moved - self.rate * dt)
+        usual, of = self._usual, self._of
+        if of < MOST_USUAL:
+            self._of = of + 1
+        if off <= FINEST * tolerance.hysteresis:  # the rule, at a fast rate
+            self._usual = usual + (off - usual) / of
+            return False
+        if math.isnan(off):
+            return False
         # Just after a strike the rate is that of two noisy samples.
-        off = min(abs(moved - self.rate * dt), abs(moved - self.pace * dt))
-        bound, usual = self._off_at_most(dt, tolerance), self._usual
-        self._usual += (min(off, 4.0 * usual) - usual) / self._of
-        self._of = min(self._of + 1, MOST_USUAL)
+        off = min(off, abs(moved - self.pace * dt))
+        bound = self._off_at_most(dt, tolerance)
+        self._usual = usual + (min(off, 4.0 * usual) - usual) / of
         return off > bound
 
-    def agree(self, psi: float, dt: float, later_psi: float, later_dt: float, tolerance: Tolerance) -> bool:
-        """Whether two rotations that are wild go with each other: as after a jump, or at another speed."""
-        between = later_dt - dt
-        moved = later_psi - psi
-        off = abs(moved - self.rate * between)
-        speed = (psi - self.psi) / dt
-        if abs(speed) <= tolerance.max_speed:
-            off = min(off, abs(moved - speed * between))
+    def are_in_line(self, psi: float, dt: float, later_psi: float, later_dt: float, tolerance: Tolerance) -> bool:
+        """Whether two wild rotations go with each other: the wheel jumped and goes on, or has another speed."""
+        moved, between = later_psi - psi, later_dt - dt
+        off = min(abs(moved - self.rate * between), abs(moved - (psi - self.psi) / dt * between))
         return off <= self._off_at_most(between, tolerance)
 
     def _off_at_most(self, dt: float, tolerance: Tolerance) -> float:

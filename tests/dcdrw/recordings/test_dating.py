@@ -32,6 +32,7 @@ NONE: dict[str, Times] = {
     'zero': np.zeros_like(EPOCH),
 }
 
+
 def _held_up(log: Times) -> Times:
     """Times at which a recorder writes that gets the processor seldom: it first catches up, then waits for each."""
     behind = np.maximum(4 * SECOND - SINCE * 4, 0)

@@ -561,6 +561,18 @@ def test_samples_in_bursts_make_the_same_steps_as_evenly_stamped_ones(rate: floa
     assert np.mean(rates) == pytest.approx(np.mean(expected), rel=0.02)
 
 
+@pytest.mark.parametrize(('rate', 'size'), [(60.0, 60), (200.0, 60), (30.0, 10)])
+def test_of_samples_that_come_all_at_once_after_a_pause_none_is_wild(rate: float, size: int) -> None:
+    even = walk(12.0, rate).samples(rates=False)
+    late = [
+        sample._replace(stamp_ns=START_NS + round((place // size + 1) * size / rate * SECOND) + place % size * 100_000)
+        for place, sample in enumerate(even)
+    ]
+    phases, _, status = run(late)
+    assert (status.accepted, status.strays, status.refusals, status.restarts) == (len(even), 0, {}, 0)
+    assert [phase.phi.angle for phase in phases] == [phase.phi.angle for phase in run(even)[0]]
+
+
 def counted(samples: list[JointSample], per_turn: int, low: int, width: int, zero: int = 0) -> list[JointSample]:
     """The same by counters that roll over after `width` counts, from `low` on, and that were at `zero` at ψ = 0."""
 
