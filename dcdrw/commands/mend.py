@@ -33,5 +33,7 @@ def run(options: argparse.Namespace) -> int:
         count = mend(recording, options.out)
         for text in recording.damage:
             print(f'dcdrw mend: left out: {text}', file=sys.stderr)
+        for text in recording.notes:
+            print(f'dcdrw mend: {text}', file=sys.stderr)
         print(f'Written: {options.out}/ with {counted(count, "message")}')
         return 1 if recording.damage else 0

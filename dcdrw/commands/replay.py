@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -19,7 +20,7 @@ The samples keep the stamps that they had, and /clock goes with them: start the 
 see the trial as it was. FACTOR is that of the stamps' time. The replay begins when somebody listens to joint_states;
 until then /clock stands at the first stamp.
 S counts from the recording's start, by its recorder's clock.
-Exit status: 0 all was sent, 2 wrong input, 130 interrupted.
+Exit status: 0 all was sent, 1 all but what is damaged, 2 wrong input, 130 interrupted.
 """
 
 
@@ -96,8 +97,10 @@ def run(options: argparse.Namespace) -> int:
             status = run_node('dcdrw replay', make, ['--ros-args', *namespace])
         if node is None:
             return status
+        for text in (*recording.damage, *recording.notes):
+            print(f'dcdrw replay: {text}', file=sys.stderr)
         print(f'{counted(node.sent, "joint state")} sent')
-        return 0 if node.done else 130
+        return 130 if not node.done else 1 if recording.damage else 0
 
 
 def _window(options: argparse.Namespace, recording: Recording) -> tuple[int, int]:

@@ -30,16 +30,17 @@ def replay(bench, *arguments: str) -> subprocess.Popen[str]:
         text=True,
         env={**os.environ, 'PYTHONPATH': str(ROOT), 'ROS_DOMAIN_ID': str(bench.domain)},
         stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
     )
     bench.processes.append(process)
     return process
 
 
-def finish(bench, process) -> str:
-    """Wait for its end; return what it printed."""
+def finish(bench, process) -> tuple[str, str]:
+    """Wait for its end; return what it printed, and on standard error."""
     bench.wait(lambda: process.poll() is not None, 'the end of the replay')
     bench.spin(0.5)
-    return process.communicate()[0]
+    return process.communicate()
 
 
 def recorded(path: Path, topic: str):
@@ -52,7 +53,7 @@ def test_estimator_says_again_what_it_said_live(bench, live_trial):
     phases, clocks, falls = bench.hear(PHASE_STATE), bench.hear(CLOCK), bench.hear(FOOTFALLS['front'])
     bench.wait(lambda: bench.node.count_publishers('phase_state'), 'the estimator')
     process = replay(bench, str(live_trial), '--rate', '2')
-    assert 'joint states sent' in finish(bench, process)
+    assert 'joint states sent' in finish(bench, process)[0]
     assert process.returncode == 0
     batches = recorded(live_trial, '/phase_state')
     names = batches[0].names
@@ -96,10 +97,22 @@ def renamed(tmp_path):
 def test_part_of_a_recording_is_replayed_by_its_own_names(bench, renamed):
     joints = bench.hear(JOINT_STATES)
     process = replay(bench, str(renamed), '--from', '2', '--to', '4.5', '--rate', '5')
-    assert finish(bench, process) == '250 joint states sent\n'
+    assert finish(bench, process)[0] == '250 joint states sent\n'
     assert [message.position[0] for message in joints] == list(range(200, 450))
     assert joints[0].name == ['hub_a', 'arm', 'hub_b']
     assert stamp_ns(joints[0].header.stamp) == 7 * 10**9
+
+
+def test_what_is_damaged_is_said_and_left_out(bench, renamed):
+    (part,) = renamed.glob('*.mcap')
+    part.write_bytes(part.read_bytes()[: part.stat().st_size // 2])
+    joints = bench.hear(JOINT_STATES)
+    process = replay(bench, str(renamed), '--rate', '20')
+    said, complaint = finish(bench, process)
+    assert said == f'{len(joints)} joint states sent\n'
+    assert 0 < len(joints) < 1000
+    assert process.returncode == 1
+    assert complaint.startswith('dcdrw replay: ')
 
 
 def test_pace_is_that_of_the_stamps_whatever_the_recorder_saw(bench, tmp_path):
@@ -116,7 +129,7 @@ def test_pace_is_that_of_the_stamps_whatever_the_recorder_saw(bench, tmp_path):
     process = replay(bench, str(bag))
     bench.wait(lambda: joints, 'a joint state')
     begun = time.monotonic()
-    assert finish(bench, process) == '200 joint states sent\n'
+    assert finish(bench, process)[0] == '200 joint states sent\n'
     assert time.monotonic() - begun > 1.0  # of 1.98 s by the stamps, 0.2 s by the log
     assert stamp_ns(clocks[-1].clock) == stamp_ns(joints[-1].header.stamp) == jump + 199 * 10**7
 
@@ -135,7 +148,7 @@ def test_who_listens_only_when_the_time_is_known_hears_the_whole(bench, tmp_path
     bench.wait(lambda: joints, 'a joint state')
     times = [stamp_ns(clock.clock) for clock in clocks]
     assert times[: len(times) // 2] == [start_ns or 1] * (len(times) // 2)  # it stood still most of the while
-    assert finish(bench, process) == '100 joint states sent\n'
+    assert finish(bench, process)[0] == '100 joint states sent\n'
     assert [message.position[0] for message in joints] == list(range(100))
     times = [stamp_ns(clock.clock) for clock in clocks]
     assert times == sorted(times)
@@ -150,7 +163,7 @@ def test_rig_file_gives_the_joints_the_names_of_the_suite(bench, renamed, tmp_pa
     process = replay(
         bench, str(renamed), '--rig', str(tmp_path / 'rig.yaml'), '--into', 'rig_2', '--to', '1', '--rate', '4'
     )
-    assert finish(bench, process) == '100 joint states sent\n'
+    assert finish(bench, process)[0] == '100 joint states sent\n'
     assert joints[99].name == ['front_wheel', 'arm', 'rear_wheel']
     assert joints[99].position.tolist() == [99.0, 0.5, -99.0]
 
@@ -169,7 +182,7 @@ def test_poses_are_replayed_as_the_joint_states_that_they_tell(bench, tmp_path):
     bag = pose_bag(tmp_path / 'bag', streams(walk(4.0, 120.0)))
     joints = bench.hear(JOINT_STATES)
     process = replay(bench, str(bag), '--from', '1', '--rate', '4', '--namespace', 'mocap')
-    assert 'joint states sent' in finish(bench, process)
+    assert 'joint states sent' in finish(bench, process)[0]
     assert process.returncode == 0
     assert 340 < len(joints) < 361
     assert joints[0].name == ['front_wheel', 'rear_wheel']
