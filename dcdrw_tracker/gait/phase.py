@@ -48,6 +48,8 @@ OFTEN = 5
 """So often no clock is set: the stamps lack a part."""
 MANY_SLOW = 5
 """So many strikes, and no other, of wheels that turn slower than any that rolls by itself make the unit doubtful."""
+LONGEST_WAIT = 0.3
+"""So long at most a source that vouches for its turns waits until it tells them again [s]."""
 MOVING = 0.2
 """A wheel that is slower tells nothing about the clock [rad/s]."""
 
@@ -422,10 +424,25 @@ class PhaseEstimator:
         if joints.stamp_ns - self._begun_ns < BURSTS_NS or not self._cadence.is_gap(elapsed_ns * 1e-9):
             return False
         paused_ns = arrival_ns - self._arrived_ns if self._arrived_ns and arrival_ns else elapsed_ns
-        if (self._front.may_wrap or self._rear.may_wrap) and paused_ns > elapsed_ns // 2:
+        may_wrap = not joints.run and (self._front.may_wrap or self._rear.may_wrap)
+        if may_wrap and paused_ns > elapsed_ns // 2:
             return False
         held_ns = joints.stamp_ns - self._held[0].joints.stamp_ns if self._held else 0
-        return self._goes_on(joints, (period_ns + max(held_ns, 0)) * 1e-9)
+        return self._goes_on(joints, self._passed(joints) if joints.run else (period_ns + max(held_ns, 0)) * 1e-9)
+
+    def _passed(self, joints: JointSample) -> float:
+        """Time that has truly passed since the last sample, were the clock set [s].
+
+        A period, or where the source vouches for its turns, as from poses, of which it waits for some: as long as the
+        wheels took at their pace.
+        """
+        assert self._last
+        period = self._cadence.period_ns * 1e-9
+        pairs = (self._front, joints.front, self._last.front), (self._rear, joints.rear, self._last.rear)
+        if not joints.run or any(abs(wheel.pace) < MOVING for wheel, *_ in pairs):
+            return period
+        took = sum((now.angle - then.angle) / wheel.pace for wheel, now, then in pairs) / len(pairs)
+        return min(max(took, period), LONGEST_WAIT)
 
     def _goes_on(self, joints: JointSample, dt: float) -> bool:
         """Whether both wheels move, and are where their pace takes them within dt."""
@@ -575,15 +592,15 @@ class PhaseEstimator:
             return None
         if held[0].why == 'outlier':
             return self._restart(held, 'rotation')
-        period_ns = self._cadence.period_ns
-        if self._go_on(held, period_ns):
-            return self._bridge(held, period_ns)
+        passed = self._passed(held[0].joints)
+        if self._go_on(held, passed):
+            return self._bridge(held, passed)
         return self._adopt(held) if held[0].why == 'future' else self._restart(held, 'stamp')
 
-    def _go_on(self, held: list['_Held'], period_ns: int) -> bool:
-        """Whether these samples go on from the last one as if no time but a period had passed."""
+    def _go_on(self, held: list['_Held'], passed: float) -> bool:
+        """Whether these samples go on from the last one as if no more time had passed [s]."""
         first, latest = held[0].joints, held[-1].joints
-        if not period_ns or not self._goes_on(first, period_ns * 1e-9):
+        if not passed or not self._goes_on(first, passed):
             return False
         if held[0].why == 'reversed' and (self._front.wraps or self._rear.wraps):  # whole turns do not show
             return False
@@ -595,17 +612,17 @@ class PhaseEstimator:
 
     def _has_turned(self, held: list['_Held']) -> bool:
         """Whether samples by a clock that may have been set span enough time to tell whether the wheels still turn."""
-        if held[0].why == 'outlier' or not self._goes_on(held[0].joints, self._cadence.period_ns * 1e-9):
+        if held[0].why == 'outlier' or not self._goes_on(held[0].joints, self._passed(held[0].joints)):
             return True
         span = (held[-1].joints.stamp_ns - held[0].joints.stamp_ns) * 1e-9
         slowest = min(abs(self._front.pace), abs(self._rear.pace))
         return slowest < MOVING or slowest * span >= 4.0 * self._tolerance.hysteresis
 
-    def _bridge(self, held: list['_Held'], period_ns: int) -> PhaseUpdate | None:
-        """Go on from samples by a clock that was set."""
+    def _bridge(self, held: list['_Held'], passed: float) -> PhaseUpdate | None:
+        """Go on from samples by a clock that was set, of which the first came so much after the last before it [s]."""
         assert self._last
         first_ns = held[0].joints.stamp_ns
-        step_ns = first_ns - self._last.stamp_ns - period_ns
+        step_ns = first_ns - self._last.stamp_ns - round(passed * 1e9)
         self._clock_steps.append(ClockStep(first_ns + self._clock_ns, step_ns * 1e-9))
         self._clock_ns += step_ns
         return self._adopt(

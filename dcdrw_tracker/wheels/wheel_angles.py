@@ -6,7 +6,7 @@ from dcdrw_msgs_py.rolling import hub_travel
 from dcdrw_msgs_py.samples import JointSample, Turn
 from dcdrw_tracker.gait.cadence import Cadence, CadenceStatus
 from dcdrw_tracker.tags.wheel_view import PairView, WheelView
-from dcdrw_tracker.wheels.wheel_track import Taken, TrackParams, TrackStatus, WheelTrack
+from dcdrw_tracker.wheels.wheel_track import START_VIEWS, Taken, TrackParams, TrackStatus, WheelTrack
 
 
 class AnglesStatus(NamedTuple):
@@ -58,9 +58,10 @@ class WheelAngles:
         if self._stamp_ns is not None and view.stamp_ns <= self._stamp_ns:
             self._out_of_order += 1
             self._behind += view.stamp_ns < self._stamp_ns
-            if self._behind < self._relock_views:
-                return None
-            self._start_anew(view.stamp_ns)  # a recording that loops, a clock that was set back
+            if not (self._behind >= START_VIEWS and self._set_back(view)):
+                if self._behind < self._relock_views:
+                    return None
+                self._start_anew(view.stamp_ns)  # a recording that loops
         self._behind = 0
         self._stamp_ns = view.stamp_ns
         self._cadence.tick(view.stamp_ns)
@@ -85,6 +86,18 @@ class WheelAngles:
             front.status(),
             rear.status(),
         )
+
+    def _set_back(self, view: PairView) -> bool:
+        """Whether both wheels have gone on while the stamps went back: only the clock was set. The tracks follow it."""
+        assert self._stamp_ns is not None
+        passed_ns = self._behind * self._cadence.period_ns
+        pairs = tuple(zip(self._tracks, view[1:], strict=True))
+        if not all(seen and track.goes_on(seen, passed_ns * 1e-9) for track, seen in pairs):
+            return False
+        for track in self._tracks:
+            track.set_clock(view.stamp_ns - passed_ns - self._stamp_ns)
+        self._cadence.jump(view.stamp_ns)
+        return True
 
     def _start_anew(self, stamp_ns: int) -> None:
         self._run += 1

@@ -140,6 +140,18 @@ class WheelTrack:
         self._stamp_ns, self._pace = 0, 0.0
         self.forget_travel()
 
+    def goes_on(self, view: WheelView, dt: float) -> bool:
+        """Whether the wheel turns, and a view has it where its pace takes it in dt seconds, by half more or less."""
+        along = self._pace * dt
+        off = math.remainder(view.rotation - self._psi - along, math.tau)
+        return self._filter is not None and 0.0 < abs(along) and abs(off) <= self._jump + 0.5 * abs(along)
+
+    def set_clock(self, ns: int) -> None:
+        """Take it that the clock of the views was set by so much."""
+        self._stamp_ns += ns
+        self._filter_ns += ns
+        self._held.clear()
+
     @property
     def seen_ns(self) -> int:
         """When a view was last taken; 0 where none was."""

@@ -15,12 +15,12 @@ from tests.tracker.walking import ALPHA, PITCH, START_NS, walk
 from tests.tracker.wheels.test_poses import streams, y_up
 
 
-def pose_bag(path, poses, namespace='/mocap'):
-    """A recording of poses, as rosbag2 makes it."""
-    return pose_bags(path, {namespace: poses})
+def pose_bag(path, poses, namespace='/mocap', set_ns=lambda log_ns: 0):
+    """A recording of poses, as rosbag2 makes it; the clock of the poses was set by so much."""
+    return pose_bags(path, {namespace: poses}, set_ns)
 
 
-def pose_bags(path, of):
+def pose_bags(path, of, set_ns=lambda log_ns: 0):
     """A recording of poses in several namespaces."""
     kind = {name: TYPES.types[name] for name in (FRONT_POSE.type, 'geometry_msgs/msg/Pose', 'std_msgs/msg/Header')}
     time, point, turn = (
@@ -34,8 +34,9 @@ def pose_bags(path, of):
             for namespace in of
         }
         for namespace, wheel, pose in ((namespace, *one) for namespace, poses in of.items() for one in poses):
+            stamp_ns = pose.stamp_ns + set_ns(pose.stamp_ns)
             message = kind[FRONT_POSE.type](
-                kind['std_msgs/msg/Header'](time(*divmod(pose.stamp_ns, 10**9)), 'room'),
+                kind['std_msgs/msg/Header'](time(*divmod(stamp_ns, 10**9)), 'room'),
                 kind['geometry_msgs/msg/Pose'](point(*pose.position), turn(*pose.orientation)),
             )
             log_ns = pose.stamp_ns or START_NS
@@ -62,6 +63,26 @@ def test_poses_that_come_twice_cost_nothing(tmp_path):
     )
     assert twice.samples.refused == {}
     assert (twice.front_steps, twice.final_phase_percent) == (once.front_steps, once.final_phase_percent)
+
+
+@pytest.mark.parametrize('rate', [30.0, 60.0, 120.0, 240.0])
+@pytest.mark.parametrize('seconds', [37, 2, -2, -37])
+def test_a_clock_of_poses_that_is_set_while_the_wheels_go_on_is_bridged(tmp_path, rate, seconds):
+    poses = streams(walk(9.0, rate))
+    set_at = START_NS + 5 * 10**9
+    even, stepped = (
+        summarize(read_trial(pose_bag(tmp_path / name, poses, set_ns=set_ns))[0])
+        for name, set_ns in (
+            ('even', lambda log_ns: 0),
+            ('stepped', lambda log_ns: seconds * 10**9 * (log_ns > set_at)),
+        )
+    )
+    (step,) = stepped.samples.clock_steps
+    assert step.seconds == pytest.approx(seconds, abs=0.01)
+    assert (stepped.samples.restarts, stepped.steps_to_synchronization) == ((), even.steps_to_synchronization)
+    assert stepped.front_steps == even.front_steps
+    assert stepped.final_phase_percent == pytest.approx(even.final_phase_percent, abs=0.01)
+    assert stepped.samples.lost <= 4
 
 
 def test_poses_of_no_use_are_counted_and_said(tmp_path, capsys):

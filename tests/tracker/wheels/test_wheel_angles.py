@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dcdrw_msgs_py.rolling import hub_travel
-from dcdrw_msgs_py.samples import JointSample
+from dcdrw_msgs_py.samples import SECOND, JointSample
 from dcdrw_tracker.gait.phase import PhaseEstimator, PhaseParams
 from dcdrw_tracker.tags.wheel_view import PairView
 from dcdrw_tracker.wheels.wheel_angles import AnglesStatus, WheelAngles
-from dcdrw_tracker.wheels.wheel_track import TrackParams
+from dcdrw_tracker.wheels.wheel_track import START_VIEWS, TrackParams
 from tests.tracker.filming import between, film, hub, nothing, view
 from tests.tracker.walking import ALPHA, PITCH, START_NS, STEP, Walk, walk
 
@@ -290,6 +290,20 @@ def test_a_recording_that_loops_begins_a_new_run() -> None:
     assert {sample.run for sample in samples} == {1, 2}
     assert status.lost == 1
     assert len(samples) == 2 * (len(views) - 2) - 9
+
+
+def test_a_clock_that_is_set_back_while_both_wheels_go_on_begins_no_new_run() -> None:
+    views = film(walk(6.0, FPS))
+    half = len(views) // 2
+    back = [pair._replace(stamp_ns=pair.stamp_ns - 37 * SECOND) for pair in views[half:]]
+    samples, status = follow(views[:half] + back)
+    even, _ = follow(views)
+    assert {sample.run for sample in samples} == {1}
+    assert (status.lost, status.out_of_order) == (0, START_VIEWS)
+    told = {sample.stamp_ns: sample.front.angle for sample in even}
+    for sample in samples:
+        ahead = 37 * SECOND if sample.stamp_ns < views[0].stamp_ns else 0
+        assert sample.front.angle == pytest.approx(told[sample.stamp_ns + ahead], abs=1e-9)
 
 
 VIEWS = st.none() | st.builds(view, st.floats(-10, 10), st.floats(-1e6, 1e6), st.floats())
