@@ -48,7 +48,7 @@ OFTEN = 5
 """So often no clock is set: the stamps lack a part."""
 MANY_SLOW = 5
 """So many strikes, and no other, of wheels that turn slower than any that rolls by itself make the unit doubtful."""
-LONGEST_WAIT = 0.3
+LONGEST_WAIT = 0.15
 """So long at most a source that vouches for its turns waits until it tells them again [s]."""
 MOVING = 0.2
 """A wheel that is slower tells nothing about the clock [rad/s]."""
@@ -427,11 +427,12 @@ class PhaseEstimator:
         may_wrap = not joints.run and (self._front.may_wrap or self._rear.may_wrap)
         if may_wrap and paused_ns > elapsed_ns // 2:
             return False
-        held_ns = joints.stamp_ns - self._held[0].joints.stamp_ns if self._held else 0
-        return self._goes_on(joints, self._passed(joints) if joints.run else (period_ns + max(held_ns, 0)) * 1e-9)
+        first = self._held[0].joints if self._held else joints
+        passed = self._passed(first) + max(joints.stamp_ns - first.stamp_ns, 0) * 1e-9
+        return 2e9 * passed < elapsed_ns and self._goes_on(joints, passed)
 
     def _passed(self, joints: JointSample) -> float:
-        """Time that has truly passed since the last sample, were the clock set [s].
+        """Time that has truly passed since the last sample, were the clock set [s]; NaN where it cannot have been.
 
         A period, or where the source vouches for its turns, as from poses, of which it waits for some: as long as the
         wheels took at their pace.
@@ -442,7 +443,7 @@ class PhaseEstimator:
         if not joints.run or any(abs(wheel.pace) < MOVING for wheel, *_ in pairs):
             return period
         took = sum((now.angle - then.angle) / wheel.pace for wheel, now, then in pairs) / len(pairs)
-        return min(max(took, period), LONGEST_WAIT)
+        return max(took, period) if took <= max(LONGEST_WAIT, 2.0 * period) else math.nan
 
     def _goes_on(self, joints: JointSample, dt: float) -> bool:
         """Whether both wheels move, and are where their pace takes them within dt."""

@@ -30,7 +30,8 @@ class Source:
         self.start_ns, self.count = 1_000 * MILLISECOND, 0
 
     def restart(self) -> None:
-        self.count = 0
+        """Begin anew at an earlier time: samples that come again as they were would be taken for the same."""
+        self.count, self.start_ns = 0, self.start_ns - 500 * MILLISECOND
 
     def send(self) -> int:
         angle = SPEED * 0.01 * self.count

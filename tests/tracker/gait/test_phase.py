@@ -529,6 +529,16 @@ def test_one_wild_sample_in_a_hundred_changes_no_other(rate: float, size: float,
     }
 
 
+@pytest.mark.parametrize('gap', [0.15, 0.25, 0.3, 0.35, 0.5, 1.0, 3.0])
+@pytest.mark.parametrize('rate', [30.0, 120.0])
+def test_a_gap_of_a_source_that_vouches_for_its_turns_is_no_clock_that_was_set(gap: float, rate: float) -> None:
+    samples = [sample._replace(run=1) for sample in walk(12.0, rate).samples()]
+    begin = round(6.0 * rate)
+    seen = samples[:begin] + samples[begin + round(gap * rate) :]
+    phases, _, status = run(seen)
+    assert (len(phases), status.clock_steps, status.refusals) == (len(seen), (), {})
+
+
 @pytest.mark.parametrize('rates', [True, False])
 def test_a_wheel_that_jumps_and_goes_on_loses_no_sample(rates: bool) -> None:
     samples = walk(6.0, 200.0).samples(0.01, 3, rates)
