@@ -95,6 +95,11 @@ class Analysis(NamedTuple):
     """What the synchronizer did, where one was recorded."""
 
     @property
+    def strays(self) -> int:
+        """Lone wild samples that are passed over, by the estimator or by the monitor."""
+        return self.estimator.strays + self.status.strays
+
+    @property
     def pitch(self) -> float:
         """The angle φ of a whole step, α1 + α2 [rad]."""
         return phi_pitch(self.params.sync.front, self.params.sync.rear)

@@ -112,12 +112,11 @@ def _remarks(trial: Analysis) -> Iterator[Remark]:
         yield Remark(
             f'The clock of the source was set {by} while the wheels rolled on; this is undone, and nothing left out.'
         )
-    strays = estimator.strays + trial.status.strays
-    if strays:
+    if trial.strays:
         yield Remark(
-            f'{counted(strays, "sample")} lay apart from both neighbours, and {by_count(strays, "is", "are")} passed '
-            'over.',
-            strays > MANY_STRAYS * trial.samples,
+            f'{counted(trial.strays, "sample")} lay apart from both neighbours, and '
+            f'{by_count(trial.strays, "is", "are")} passed over.',
+            trial.strays > MANY_STRAYS * trial.samples,
         )
     if estimator.rollovers:
         yield Remark(

@@ -130,7 +130,7 @@ def summarize(trial: Analysis) -> Summary:
             clock_steps=trial.estimator.clock_steps,
             foreign=trial.estimator.foreign,
             unstamped=trial.estimator.unstamped,
-            strays=trial.estimator.strays + trial.status.strays,
+            strays=trial.strays,
             duplicates=trial.estimator.duplicates,
             rollovers=trial.estimator.rollovers,
             hints=trial.estimator.hints,
